@@ -1,0 +1,3 @@
+"""Turn smoke simulations into moving paintings."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,1 @@
+"""The trained rule: hyperparameters, weights, priors and its model file."""

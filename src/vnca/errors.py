@@ -1,0 +1,41 @@
+"""What can go wrong by a user's hand, one class a cause.
+
+The command line prints the message of a `VncaError` in one line and exits with code 2.
+A message names the file, grid or option, what was expected and what came.
+"""
+
+
+class VncaError(Exception):
+    """A mistake the user can mend; the message says how."""
+
+
+class FileFormatError(VncaError):
+    """A file is missing, empty, truncated, corrupt or of an unsupported kind."""
+
+
+class GridError(VncaError):
+    """A grid is missing, of the wrong type, or does not fit its neighbours."""
+
+
+class SequenceError(VncaError):
+    """A pattern or a range of frames selects nothing or leaves gaps."""
+
+
+class OptionError(VncaError):
+    """An option or argument has a value that cannot work."""
+
+
+class ShapeError(VncaError):
+    """Arrays that must agree in shape do not."""
+
+
+class ModelError(VncaError):
+    """A model file is not one, is of a newer format, or is inconsistent."""
+
+
+class BackendUnavailableError(VncaError):
+    """A backend or frozen network was asked for by name and is not there."""
+
+
+class OutputError(VncaError):
+    """An output path cannot be written."""

@@ -1,0 +1,1 @@
+"""Files in and out: volumes, sequences, pictures and films."""

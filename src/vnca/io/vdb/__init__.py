@@ -1,0 +1,1 @@
+"""OpenVDB files, read and written without OpenVDB."""

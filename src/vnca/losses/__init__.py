@@ -1,0 +1,1 @@
+"""The terms training minimises, one file a term."""

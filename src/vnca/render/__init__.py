@@ -1,0 +1,1 @@
+"""Differentiable emission–absorption rendering of stylized smoke."""

@@ -1,0 +1,1 @@
+"""A small smoke solver and scenes for demos and tests."""

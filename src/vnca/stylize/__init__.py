@@ -1,0 +1,1 @@
+"""Rolling a trained rule over a sequence of smoke."""

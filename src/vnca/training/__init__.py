@@ -1,0 +1,1 @@
+"""From one frame and one picture to a rule."""

@@ -1,0 +1,65 @@
+"""Imports go strictly downwards, and only some layers may know torch."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import vnca
+
+ROOT = Path(vnca.__file__).parent
+RANKS = {
+    "errors": 0, "typing": 0,
+    "volume": 1, "camera": 1, "colour": 1, "files": 1, "domain": 1, "kernels": 1,
+    "io": 2, "automaton": 2, "render": 2, "features": 2, "simulate": 2,
+    "losses": 3, "stylize": 3,
+    "training": 4, "evaluation": 4, "texturing": 4,
+    "viewer": 5,
+    "cli": 6,
+}  # fmt: skip
+WITHOUT_TORCH = {
+    "errors", "typing", "volume", "camera", "colour", "files", "domain", "io", "automaton",
+    "simulate", "stylize",
+}  # fmt: skip
+SOURCES = sorted(p for p in ROOT.rglob("*.py") if p != ROOT / "__init__.py")
+
+
+def layer(path: Path) -> str:
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def imported_names(path: Path) -> set[str]:
+    """Every module imported anywhere in the file, also inside functions."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            names.add(node.module or "")
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return names
+
+
+def imported_layers(path: Path) -> set[str]:
+    parts = [name.split(".") for name in imported_names(path)]
+    return {p[1] for p in parts if p[0] == "vnca" and len(p) > 1 and p[1] in RANKS}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_go_downwards(path: Path) -> None:
+    here = layer(path)
+    assert here in RANKS, f"{here} has no rank: add it to the design and to this table"
+    for there in imported_layers(path) - {here}:
+        assert RANKS[there] < RANKS[here], f"{path.name} ({here}) imports {there}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_core_layers_do_not_import_torch(path: Path) -> None:
+    if layer(path) in WITHOUT_TORCH:
+        assert not any(name.split(".")[0] == "torch" for name in imported_names(path))
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_files_stay_small(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= 500
