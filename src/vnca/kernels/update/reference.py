@@ -1,0 +1,128 @@
+"""One step of the automaton, written to be read; differentiable; float32 and float64."""
+
+from typing import Any, NamedTuple
+
+import torch
+from torch import Tensor
+
+SLAB = 4096
+"""Cells worked through at a time: their perception and hidden layer stay in cache."""
+
+
+class Weights(NamedTuple):
+    """The trained weights of a rule.
+
+    Attributes:
+        hidden: W1 `[hidden, 5C + P]`.
+        bias: b1 `[hidden]`.
+        output: W2 `[C, hidden]`.
+    """
+
+    hidden: Tensor
+    bias: Tensor
+    output: Tensor
+
+
+def perceive(neighbourhood: Tensor, stencil: Tensor) -> Tensor:
+    """Perception z: the cell's state, its gradient along x, y and z, and its Laplacian.
+
+    Args:
+        neighbourhood: `[27, cells, C]` states around each cell, in the order of `OFFSETS`.
+        stencil: `[5, 27]`.
+
+    Returns:
+        `[cells, 5C]`, one filter after the other.
+
+    Reference: VNCA, equation for z_ijk.
+    """
+    _, cells, channels = neighbourhood.shape
+    filtered = (stencil @ neighbourhood.flatten(1)).view(-1, cells, channels)
+    return filtered.transpose(0, 1).flatten(1)
+
+
+def change(neighbourhood: Tensor, priors: Tensor, weights: Weights, stencil: Tensor) -> Tensor:
+    """∂s/∂t `[cells, C]` = W2 relu(W1 [z ‖ priors] + b1).
+
+    Reference: VNCA, equation for ∂s_ijk/∂t, with the velocity that its text and figure have.
+    """
+    z = torch.cat([perceive(neighbourhood, stencil), priors], dim=1)
+    hidden = torch.relu(torch.addmm(weights.bias, z, weights.hidden.t()))
+    return hidden @ weights.output.t()
+
+
+def update(
+    state: Tensor,
+    rows: Tensor,
+    neighbours: Tensor,
+    priors: Tensor,
+    weights: Weights,
+    stencil: Tensor,
+) -> Tensor:
+    """The state after one step: s' = s + change on `rows`, s elsewhere.
+
+    Differentiable in the state and the weights. Cells are worked through in slabs, and the
+    backward pass recomputes a slab's hidden layer, so memory beyond the two states does not grow
+    with the grid.
+
+    Args:
+        state: `[n + 1, C]`; the last row is the outside, always zero.
+        rows: `[m]` cells that change in this step, int32, each at most once.
+        neighbours: `[27, n]` rows of the state around each cell, int32; n where nothing lives.
+        priors: `[n, P]`.
+        weights: W1, b1 and W2.
+        stencil: `[5, 27]` perception filters.
+
+    Returns:
+        `[n + 1, C]`.
+    """
+    result = _Update.apply(state, rows, neighbours, priors, *weights, stencil)
+    assert isinstance(result, Tensor)
+    return result
+
+
+class _Update(torch.autograd.Function):
+    @staticmethod
+    def forward(
+        ctx: Any,
+        state: Tensor,
+        rows: Tensor,
+        neighbours: Tensor,
+        priors: Tensor,
+        hidden: Tensor,
+        bias: Tensor,
+        output: Tensor,
+        stencil: Tensor,
+    ) -> Tensor:
+        ctx.save_for_backward(state, rows, neighbours, priors, hidden, bias, output, stencil)
+        weights = Weights(hidden, bias, output)
+        result = state.clone()
+        for slab in rows.split(SLAB):
+            around = _gather(state, neighbours, slab)
+            result[slab] += change(around, priors[slab], weights, stencil)
+        return result
+
+    @staticmethod
+    def backward(ctx: Any, *grad_outputs: Tensor) -> tuple[Tensor | None, ...]:
+        (gradient,) = grad_outputs
+        state, rows, neighbours, priors, *matrices, stencil = ctx.saved_tensors
+        weights = Weights(*(matrix.detach().requires_grad_() for matrix in matrices))
+        to_state = gradient.clone()
+        to_weights = [torch.zeros_like(matrix) for matrix in matrices]
+        for slab in rows.split(SLAB):
+            around = _gather(state, neighbours, slab).requires_grad_()
+            with torch.enable_grad():
+                changed = change(around, priors[slab], weights, stencil)
+            to_around, *slab_weights = torch.autograd.grad(
+                changed, (around, *weights), gradient[slab]
+            )
+            to_state.index_add_(0, neighbours[:, slab].flatten().long(), to_around.flatten(0, 1))
+            for total, part in zip(to_weights, slab_weights, strict=True):
+                total += part
+        to_state[-1] = 0  # the outside is a constant
+        return to_state, None, None, None, *to_weights, None
+
+
+def _gather(state: Tensor, neighbours: Tensor, rows: Tensor) -> Tensor:
+    """States `[27, cells, C]` around the cells in `rows`."""
+    around = neighbours.index_select(1, rows)
+    return state.index_select(0, around.flatten()).view(*around.shape, -1)
