@@ -1,0 +1,127 @@
+"""Where along each ray there is smoke to sample.
+
+Everything here is about positions only, so nothing is differentiated.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+# Candidate samples looked at together: bounds the memory of large pictures.
+SAMPLES_AT_ONCE = 1 << 23
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Sample positions on the rays that meet smoke.
+
+    Attributes:
+        ray: `[rays]`, which of the rays marched this is.
+        depth: `[rays, samples]`, ascending, then NaN where a ray has fewer samples than others.
+        points: `[rays, samples, 3]`, cell coordinates; behind all smoke where depth is NaN.
+    """
+
+    ray: Tensor
+    depth: Tensor
+    points: Tensor
+
+
+@torch.no_grad()
+def march(
+    density: Tensor,
+    origins: Tensor,
+    directions: Tensor,
+    *,
+    near: float,
+    step: float,
+    offset: float,
+) -> Iterator[Samples]:
+    """Find the samples with smoke within a cell of them, for a group of rays at a time.
+
+    Samples lie at depths (k + offset) · step for whole k, wherever the smoke begins: what is
+    skipped never moves what is kept. Leaving out samples of zero density changes nothing, as
+    they neither absorb nor emit; so those that are left are packed to the front of their ray.
+
+    Args:
+        density: `[x, y, z]`.
+        origins: `[rays, 3]`, cell coordinates.
+        directions: `[rays, 3]`, unit vectors.
+        near: Depth before which nothing is sampled.
+        step: Cells between samples.
+        offset: Where the samples begin, in steps, in [0, 1).
+    """
+    smoke = density > 0
+    if not smoke.any():
+        return
+    lower, upper = _bounds(smoke)
+    enter, leave = _cross_box(origins, directions, lower - 1, upper + 1, near)
+    first = torch.ceil(enter / step - offset)
+    count = (torch.floor(leave / step - offset) - first + 1).nan_to_num(0).clamp_min(0)
+    hit = torch.nonzero(count > 0)[:, 0]
+    if not len(hit):
+        return
+    longest = int(count.max())
+    reach = _reach(smoke)
+    for rays in hit.split(max(1, SAMPLES_AT_ONCE // longest)):
+        origin, direction = origins[rays, None], directions[rays, None]
+        k = first[rays, None] + torch.arange(longest, device=density.device)
+        depth = (k + offset) * step
+        points = torch.addcmul(origin, depth[..., None], direction)
+        kept = torch.nonzero(_look_up(reach, points) & (k < (first + count)[rays, None]))
+        if not len(kept):
+            continue
+        row, column = kept.unbind(1)
+        per_ray = torch.bincount(row, minlength=len(rays))
+        starts = torch.cumsum(per_ray, 0) - per_ray
+        rank = torch.arange(len(row), device=row.device) - starts[row]
+        packed = depth.new_full((len(rays), int(per_ray.max())), math.nan)
+        packed[row, rank] = depth[row, column]
+        some = per_ray > 0
+        packed, origin, direction = packed[some], origin[some], direction[some]
+        reached = torch.where(packed.isnan(), leave[rays][some, None] + 1, packed)
+        points = torch.addcmul(origin, reached[..., None], direction)
+        yield Samples(rays[some], packed, points)
+
+
+def _bounds(smoke: Tensor) -> tuple[Tensor, Tensor]:
+    """Least and greatest cell with smoke, as points."""
+    ends = []
+    for axis in range(3):
+        others = [a for a in range(3) if a != axis]
+        cells = torch.nonzero(smoke.sum(others))
+        ends.append((cells[0], cells[-1]))
+    lower, upper = (torch.cat(end) for end in zip(*ends, strict=True))
+    return lower, upper
+
+
+def _cross_box(
+    origins: Tensor, directions: Tensor, lower: Tensor, upper: Tensor, near: float
+) -> tuple[Tensor, Tensor]:
+    """Depths at which rays enter and leave a box; enter > leave where they miss it."""
+    # Parallel to a face: the division gives ±inf, and NaN on the face itself, where the
+    # smoke has faded to nothing.
+    a, b = (lower - origins) / directions, (upper - origins) / directions
+    enter = torch.minimum(a, b).amax(-1).clamp_min(near)
+    leave = torch.maximum(a, b).amin(-1)
+    return enter, leave
+
+
+def _reach(smoke: Tensor) -> Tensor:
+    """Whether interpolation between 2×2×2 cells meets smoke: `[x + 1, y + 1, z + 1]`.
+
+    Entry `[i, j, k]` stands for the points from (i − 1, j − 1, k − 1) to (i, j, k).
+    """
+    padded = functional.pad(smoke.float(), (1, 1, 1, 1, 1, 1))
+    return functional.max_pool3d(padded[None, None], 2, stride=1)[0, 0] > 0
+
+
+def _look_up(reach: Tensor, points: Tensor) -> Tensor:
+    x, y, z = (
+        (points[..., axis].floor().long() + 1).clamp_(0, reach.shape[axis] - 1) for axis in range(3)
+    )
+    flat = (x * reach.shape[1] + y) * reach.shape[2] + z
+    return reach.view(-1)[flat]
