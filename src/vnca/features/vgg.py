@@ -1,0 +1,91 @@
+"""The frozen VGG16 whose activations say what a picture looks like.
+
+Reference: Simonyan and Zisserman 2015, configuration D.
+"""
+
+from collections.abc import Sequence
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn import functional
+
+from vnca.errors import OptionError, ShapeError
+from vnca.features.weights import CONVOLUTIONS, Weights, load_weights
+
+STYLE_LAYERS = ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1")
+"""The five layers texture automata compare (Niklasson et al. 2021)."""
+
+
+class VGG16(nn.Module):
+    """VGG16's convolutions with frozen weights.
+
+    Attributes:
+        name: Where the weights come from; losses of different ones cannot be compared.
+        origin: SHA-256 of the file they were first read from.
+    """
+
+    mean: Tensor
+
+    def __init__(self, weights: Weights) -> None:
+        super().__init__()
+        self.name = weights.name
+        self.origin = weights.origin
+        self.register_buffer("mean", torch.tensor(weights.mean).view(1, 3, 1, 1))
+        self.convolutions = nn.ModuleDict()
+        for conv, (inputs, outputs) in CONVOLUTIONS.items():
+            layer = nn.Conv2d(inputs, outputs, 3, padding=1)
+            layer.load_state_dict(
+                {kind: weights.tensors[f"{conv}.{kind}"] for kind in ("weight", "bias")}
+            )
+            self.convolutions[conv] = layer
+        self.requires_grad_(False).eval()
+        self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+
+    @classmethod
+    def load(cls, source: str = "edges", device: torch.device | str | None = None) -> "VGG16":
+        """The network with weights from `edges`, `imagenet` or the path of a file.
+
+        Raises:
+            BackendUnavailableError: If the weights are not installed or cannot be downloaded.
+            FileFormatError: If the file does not hold a VGG16.
+        """
+        return cls(load_weights(source)).to(device)
+
+    def features(
+        self, image: Float[Tensor, "b 3 r c"], layers: Sequence[str] = STYLE_LAYERS
+    ) -> list[Float[Tensor, "b _ _ _"]]:
+        """Activations after the ReLU of each of `layers`, in that order.
+
+        Nothing is computed beyond the deepest. Differentiable in `image`. Block `B` has
+        2^(B−1) times fewer rows and columns than the image, rounded up.
+
+        Args:
+            image: sRGB in 0–1.
+            layers: Names `reluB_I`, block and convolution counted from 1.
+
+        Raises:
+            OptionError: If a layer does not exist.
+            ShapeError: If the image is smaller than 32×32 or has not three channels.
+        """
+        wanted = [layer.replace("relu", "conv") for layer in layers]
+        for layer, conv in zip(layers, wanted, strict=True):
+            if conv not in CONVOLUTIONS or not layer.startswith("relu"):
+                known = ", ".join(name.replace("conv", "relu") for name in CONVOLUTIONS)
+                raise OptionError(f"layer {layer!r}: expected one of {known}")
+        if image.ndim != 4 or image.shape[1] != 3 or min(image.shape[2:]) < 32:
+            raise ShapeError(
+                f"picture for VGG16: expected [b, 3, r, c] with at least 32 rows and columns, "
+                f"got {tuple(image.shape)}"
+            )
+        x = (image - self.mean).contiguous(memory_format=torch.channels_last)
+        found: dict[str, Tensor] = {}
+        for conv, layer in self.convolutions.items():
+            if conv.endswith("_1") and conv != "conv1_1":
+                x = functional.max_pool2d(x, 2, ceil_mode=True)
+            x = functional.relu(layer(x))
+            if conv in wanted:
+                found[conv] = x
+            if len(found) == len(set(wanted)):
+                break
+        return [found[conv] for conv in wanted]

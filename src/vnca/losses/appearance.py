@@ -1,0 +1,221 @@
+"""Does a picture of the smoke look painted like the style image?"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+from torch.nn import functional
+
+from vnca.colour import linear_to_srgb
+from vnca.errors import OptionError, ShapeError
+from vnca.features.vgg import STYLE_LAYERS, VGG16
+from vnca.losses.moments import Moments, moment_distance, moments
+from vnca.losses.pixels import luminance, palette_distance
+from vnca.losses.style import sample_positions, style_distance
+from vnca.typing import FloatArray
+
+
+@dataclass(frozen=True)
+class AppearanceConfig:
+    """What is compared between a picture and the style image, and how strongly."""
+
+    layers: tuple[str, ...] = STYLE_LAYERS
+    """Layers of VGG16 to compare, `reluB_I`."""
+    style: float = 1.0
+    """Weight of style matching; 0 leaves it out."""
+    moments: float = 1.0
+    """Weight of the features' means and covariances; 0 leaves them out."""
+    pixels: float = 1.0
+    """Weight of the palette, the picture itself as layer zero; 0 leaves it out."""
+    colour: bool = True
+    """Compare the pictures in colour."""
+    grey: bool = True
+    """Compare the pictures in grey, which shapes the density."""
+    samples: int = 1024
+    """Positions drawn in each layer for style matching, from either picture."""
+    style_scale: float = 1.0
+    """Shorter side of the style image relative to the view: below 1 shrinks the brush strokes."""
+    opacity_threshold: float = 0.6
+    """Compare only where the smoke is at least this opaque."""
+
+    def __post_init__(self) -> None:
+        if min(self.style, self.moments, self.pixels) < 0:
+            raise OptionError("weights of the appearance loss must not be negative")
+        if not (self.colour or self.grey):
+            raise OptionError("the appearance loss needs colour, grey or both")
+        if self.samples < 1:
+            raise OptionError(f"samples: expected at least 1, got {self.samples}")
+        if not 0 <= self.opacity_threshold <= 1:
+            raise OptionError(f"opacity threshold: expected 0 to 1, got {self.opacity_threshold}")
+        if self.style_scale <= 0:
+            raise OptionError(f"style scale: expected more than 0, got {self.style_scale}")
+
+
+class Appearance(NamedTuple):
+    """The appearance loss and its terms, weighted: they add up to the total."""
+
+    total: Float[Tensor, ""]
+    terms: dict[str, Float[Tensor, ""]]
+
+
+class _Layer(NamedTuple):
+    """What the style image shows in one layer."""
+
+    features: Float[Tensor, "n c"]
+    moments: Moments
+    scale: float
+
+
+class AppearanceLoss:
+    """Distance between pictures and one style image, over several layers of VGG16.
+
+    Attributes:
+        background: Mean colour of the style image, linear RGB `[3]`. Pictures are best
+            composited over it, so that thin smoke does not read as black paint.
+
+    Reference: the VNCA paper's L_app; Kolkin, Salavon and Shakhnarovich 2019.
+    """
+
+    # Below this many positions a layer says little about texture: the most opaque are added.
+    fewest_positions = 16
+    # Thinner smoke shows too little of its colour to be compared.
+    least_opacity = 0.05
+    # Positions of the style image kept in each layer
+    most_style_positions = 16384
+    _seed = 0
+
+    def __init__(
+        self, vgg: VGG16, style_image: FloatArray, config: AppearanceConfig, size: int
+    ) -> None:
+        """Prepare the style image.
+
+        Args:
+            vgg: The frozen network; its device is the device of the loss.
+            style_image: Linear RGB `[r, c, 3]`.
+            config: What is compared.
+            size: Shorter side of the views, pixels.
+
+        Raises:
+            ShapeError: If the image is not `[r, c, 3]`.
+        """
+        if style_image.ndim != 3 or style_image.shape[2] != 3:
+            raise ShapeError(f"style image: expected [r, c, 3], got {style_image.shape}")
+        self.config = config
+        self._vgg = vgg
+        linear = torch.from_numpy(style_image).to(vgg.mean.device).permute(2, 0, 1)[None]
+        self.background = linear.mean((0, 2, 3))
+        shorter = max(32, round(size * config.style_scale))
+        self._generator = torch.Generator().manual_seed(self._seed)
+        with torch.no_grad():
+            picture = _as_srgb(_resized(linear, shorter))
+            self._pixels = self._kept(_positions(picture)[0])
+            self._layers = [
+                [self._described(maps) for maps in layer] for layer in self._features(picture)
+            ]
+
+    def __call__(
+        self,
+        picture: Float[Tensor, "b 3 r c"],
+        opacity: Float[Tensor, "b r c"],
+        generator: torch.Generator,
+    ) -> Appearance:
+        """Mean over the pictures of the summed distances over the layers.
+
+        Differentiable in `picture`; `opacity` only chooses positions. A picture without smoke
+        contributes zero.
+
+        Args:
+            picture: sRGB in 0–1.
+            opacity: 0–1.
+            generator: Draws the positions.
+
+        Raises:
+            ShapeError: If picture and opacity differ in size.
+        """
+        if opacity.shape != (picture.shape[0], *picture.shape[2:]):
+            raise ShapeError(
+                f"opacity: expected {(picture.shape[0], *picture.shape[2:])} to match the "
+                f"picture, got {tuple(opacity.shape)}"
+            )
+        config = self.config
+        nothing = (picture * 0).sum()
+        terms = {"style": nothing, "moments": nothing, "pixels": nothing}
+        if config.pixels:
+            for pixels, where in zip(
+                _positions(picture), self._chosen(opacity, picture), strict=True
+            ):
+                if len(where):
+                    drawn = where[self._draw(len(where), generator, where)]
+                    theirs = self._pixels[self._draw(len(self._pixels), generator, where)]
+                    terms["pixels"] = terms["pixels"] + palette_distance(pixels[drawn], theirs)
+        if config.style or config.moments:
+            for maps, styles in zip(self._features(picture), self._layers, strict=True):
+                chosen = list(self._chosen(opacity, maps[0]))
+                for kind, style in zip(maps, styles, strict=True):
+                    for features, where in zip(_positions(kind), chosen, strict=True):
+                        if not len(where):
+                            continue
+                        features = features[where] / style.scale
+                        if config.moments:
+                            terms["moments"] = terms["moments"] + moment_distance(
+                                moments(features), style.moments
+                            )
+                        if config.style:
+                            ours = features[self._draw(len(features), generator, where)]
+                            theirs = self._draw(len(style.features), generator, where)
+                            terms["style"] = terms["style"] + style_distance(
+                                ours, style.features[theirs]
+                            )
+        weights = {"style": config.style, "moments": config.moments, "pixels": config.pixels}
+        terms = {name: value * weights[name] / len(picture) for name, value in terms.items()}
+        return Appearance(torch.stack(list(terms.values())).sum(), terms)
+
+    def _draw(self, count: int, generator: torch.Generator, like: Tensor) -> Int[Tensor, " n"]:
+        return sample_positions(count, self.config.samples, generator, like.device)
+
+    def _features(self, picture: Tensor) -> list[list[Tensor]]:
+        """Per layer, the maps of the picture in colour, in grey, or both."""
+        kinds = [picture] * self.config.colour + [luminance(picture)] * self.config.grey
+        maps = self._vgg.features(torch.cat(kinds), self.config.layers)
+        return [list(layer.split(len(picture))) for layer in maps]
+
+    def _described(self, maps: Tensor) -> _Layer:
+        features = _positions(maps)[0]
+        scale = features.square().mean().sqrt().clamp_min(1e-12).item()
+        features = features / scale
+        return _Layer(self._kept(features), moments(features), scale)
+
+    def _kept(self, features: Tensor) -> Tensor:
+        count = self.most_style_positions
+        return features[
+            sample_positions(len(features), count, self._generator, features.device)
+        ].clone()
+
+    def _chosen(self, opacity: Tensor, maps: Tensor) -> Iterator[Int[Tensor, " n"]]:
+        """For each picture, the positions of `maps` that show mostly smoke."""
+        shown = functional.adaptive_avg_pool2d(opacity.detach()[:, None], tuple(maps.shape[2:]))
+        for values in shown.flatten(1):
+            where = (values > self.config.opacity_threshold).nonzero()[:, 0]
+            if len(where) < self.fewest_positions:
+                top = values.topk(min(self.fewest_positions, len(values)))
+                where = top.indices[top.values > self.least_opacity]
+            yield where
+
+
+def _positions(maps: Float[Tensor, "b c r k"]) -> Float[Tensor, "b n c"]:
+    return maps.flatten(2).transpose(1, 2)
+
+
+def _resized(image: Tensor, shorter: int) -> Tensor:
+    rows, columns = image.shape[2:]
+    factor = shorter / min(rows, columns)
+    size = (max(32, round(rows * factor)), max(32, round(columns * factor)))
+    return functional.interpolate(image, size, mode="bilinear", antialias=True)
+
+
+def _as_srgb(linear: Tensor) -> Tensor:
+    encoded = linear_to_srgb(linear.clamp(0, 1).cpu().numpy())
+    return torch.from_numpy(encoded).to(linear)
