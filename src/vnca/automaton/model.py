@@ -1,0 +1,112 @@
+"""The model file: a rule as safetensors with JSON metadata. Data only, never code."""
+
+import dataclasses
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
+
+import vnca
+from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.errors import ModelError
+from vnca.files import existing_file, whole_file
+
+FORMAT_VERSION = 1
+MODEL_NAME = "model.safetensors"
+"""Name of the model in a run folder."""
+
+_WEIGHTS = ("hidden", "bias", "output")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A rule with its provenance.
+
+    Attributes:
+        rule: The rule.
+        training: How it came about: style, features, preset, iterations, seed, …; JSON values.
+        style: sRGB thumbnail `[r, c, 3]` of the style picture, uint8, or None.
+        version: The `vnca` that wrote the file.
+    """
+
+    rule: Rule
+    training: dict[str, Any] = field(default_factory=dict)
+    style: NDArray[np.uint8] | None = None
+    version: str = vnca.__version__
+
+    def save(self, path: Path) -> None:
+        """Write the model file, whole or not at all.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        tensors: dict[str, NDArray[Any]] = {
+            name: np.ascontiguousarray(getattr(self.rule, name), dtype=np.float32)
+            for name in _WEIGHTS
+        }
+        if self.style is not None:
+            tensors["style"] = np.ascontiguousarray(self.style)
+        metadata = {
+            "format": "vnca",
+            "format_version": str(FORMAT_VERSION),
+            "version": self.version,
+            "rule": json.dumps(dataclasses.asdict(self.rule.config)),
+            "scales": json.dumps(dataclasses.asdict(self.rule.scales)),
+            "training": json.dumps(self.training),
+        }
+        with whole_file(path) as temporary:
+            save_file(tensors, temporary, metadata=metadata)
+
+    @classmethod
+    def load(cls, path: Path) -> "Model":
+        """Read a model file, or the model in a run folder.
+
+        Raises:
+            FileFormatError: If the file is missing or empty.
+            ModelError: If it is not a model, of a newer format, or inconsistent.
+        """
+        path = Path(path)
+        if path.is_dir():
+            if not (path / MODEL_NAME).exists():
+                raise ModelError(f"{path}: no {MODEL_NAME} in this folder; is it a training run?")
+            path = path / MODEL_NAME
+        existing_file(path)
+        try:
+            with safe_open(path, framework="numpy") as file:
+                metadata = file.metadata() or {}
+                tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        except (SafetensorError, OSError, ValueError, TypeError) as error:
+            raise ModelError(f"{path}: not a vnca model ({error})") from error
+        if metadata.get("format") != "vnca":
+            raise ModelError(f"{path}: a safetensors file, but not a vnca model")
+        _check_format(path, metadata.get("format_version", ""))
+        try:
+            rule = Rule(
+                **{name: tensors[name].astype(np.float32) for name in _WEIGHTS},
+                config=RuleConfig(**json.loads(metadata["rule"])),
+                scales=Scales(**json.loads(metadata["scales"])),
+            )
+            training = json.loads(metadata["training"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise ModelError(f"{path}: damaged model metadata ({error})") from error
+        except ModelError as error:
+            raise ModelError(f"{path}: {error}") from error
+        style = tensors.get("style")
+        if style is not None and (style.dtype != np.uint8 or style.ndim != 3):
+            raise ModelError(f"{path}: the style thumbnail is not an 8-bit picture")
+        return cls(rule, training, style, metadata.get("version", "unknown"))
+
+
+def _check_format(path: Path, version: str) -> None:
+    if not version.isdecimal():
+        raise ModelError(f"{path}: the model has no format version")
+    if int(version) > FORMAT_VERSION:
+        raise ModelError(
+            f"{path}: model format {version} is newer than this vnca reads ({FORMAT_VERSION}); "
+            "upgrade vnca"
+        )

@@ -1,0 +1,121 @@
+"""The update rule of an automaton: its hyperparameters, weights and normalisers."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vnca.errors import ModelError, OptionError
+from vnca.kernels.update.stencil import FILTERS
+from vnca.typing import FloatArray
+
+PRIORS = 7
+"""Position (3), density (1) and velocity (3); one that is switched off is zero."""
+
+COLOUR = slice(0, 3)
+"""Channels that are shown, as sRGB minus one half."""
+DENSITY_CHANGE = 3
+"""Channel of Δd, used clamped to ±`DENSITY_LIMIT`."""
+DENSITY_LIMIT = 0.5
+
+SMOKE_THRESHOLD = 0.01
+"""Normalised density from which a cell counts as smoke; fainter smoke is not painted."""
+
+
+@dataclass(frozen=True)
+class RuleConfig:
+    """The shape of a rule."""
+
+    channels: int = 12
+    """Channels of a cell's state: colour (3), density change (1), the rest hidden."""
+    hidden: int = 96
+    """Width of the hidden layer."""
+    update_probability: float = 0.5
+    """Chance of a cell to change in a step."""
+    sobel_divisor: float = 32.0
+    """Divisor of the 3×3×3 Sobel filters."""
+    laplacian_divisor: float = 26.0
+    """Divisor of the 27-point Laplacian."""
+    position_prior: bool = True
+    """Tell cells where in the sequence's box they are."""
+    density_prior: bool = True
+    """Tell cells the density of the smoke."""
+    velocity_prior: bool = True
+    """Tell cells the velocity of the smoke."""
+
+    def __post_init__(self) -> None:
+        if self.channels < 4:
+            raise OptionError(f"--channels {self.channels}: at least 4 are needed (colour and Δd)")
+        if self.hidden < 1:
+            raise OptionError(f"--hidden {self.hidden}: at least 1 is needed")
+        if not 0 < self.update_probability <= 1:
+            raise OptionError(f"--update-probability {self.update_probability}: must be in (0, 1]")
+        if self.sobel_divisor <= 0 or self.laplacian_divisor <= 0:
+            raise OptionError("--sobel-divisor and --laplacian-divisor must be positive")
+
+    @property
+    def inputs(self) -> int:
+        """Inputs of the hidden layer: perception and priors."""
+        return FILTERS * self.channels + PRIORS
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What turns the numbers of files into the numbers a rule sees and the renderer draws."""
+
+    density: float = 1.0
+    """Density of a file that counts as 1."""
+    velocity: float = 1.0
+    """Cells per frame that count as 1."""
+    gamma: float = 1.0
+    """Extinction of density 1, per cell: the paper's brightness control."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """A rule that can be applied: s' = s + m · W2 relu(W1 [perception ‖ priors] + b1).
+
+    Attributes:
+        hidden: W1 `[hidden, 5C + 7]`.
+        bias: b1 `[hidden]`.
+        output: W2 `[C, hidden]`.
+        config: Its shape.
+        scales: Its normalisers.
+    """
+
+    hidden: FloatArray
+    bias: FloatArray
+    output: FloatArray
+    config: RuleConfig = field(default_factory=RuleConfig)
+    scales: Scales = field(default_factory=Scales)
+
+    def __post_init__(self) -> None:
+        expected = {
+            "hidden": (self.config.hidden, self.config.inputs),
+            "bias": (self.config.hidden,),
+            "output": (self.config.channels, self.config.hidden),
+        }
+        for name, shape in expected.items():
+            weights = getattr(self, name)
+            if weights.shape != shape:
+                raise ModelError(f"weights '{name}': expected shape {shape}, got {weights.shape}")
+            if not np.isfinite(weights).all():
+                raise ModelError(f"weights '{name}': not all finite")
+
+    @classmethod
+    def initial(cls, config: RuleConfig, scales: Scales, *, seed: int) -> "Rule":
+        """A rule before training: W1 uniform (He), b1 and W2 zero, so that nothing changes yet."""
+        bound = np.sqrt(6 / config.inputs)
+        random = np.random.default_rng(seed)
+        shape = (config.hidden, config.inputs)
+        return cls(
+            hidden=random.uniform(-bound, bound, shape).astype(np.float32),
+            bias=np.zeros(config.hidden, dtype=np.float32),
+            output=np.zeros((config.channels, config.hidden), dtype=np.float32),
+            config=config,
+            scales=scales,
+        )
+
+    @property
+    def weight_count(self) -> int:
+        """Number of trained weights."""
+        return self.hidden.size + self.bias.size + self.output.size

@@ -1,0 +1,122 @@
+"""Every hyperparameter of training, with its presets."""
+
+import dataclasses
+from dataclasses import dataclass, field
+
+from vnca.automaton.rule import RuleConfig
+from vnca.errors import OptionError
+from vnca.losses.appearance import AppearanceConfig
+
+
+@dataclass(frozen=True)
+class ViewConfig:
+    """How the smoke is looked at while training."""
+
+    size: int = 128
+    """Rows and columns of a view, pixels."""
+    elevation: float = 30.0
+    """Views come from up to this many degrees above or below the horizon."""
+    step: float = 1.0
+    """Distance between samples along a ray, cells."""
+    render_mode: str = "sane"
+    """Integrand: `sane` (emission-absorption) or `paper` (as printed in the paper)."""
+    opacity: float = 0.97
+    """Without a given gamma, one is chosen that makes the smoke this opaque, seen from afar."""
+    gamma: float | None = None
+    """Extinction of density 1, per cell; chosen from the frame unless given."""
+
+    def __post_init__(self) -> None:
+        if self.size < 32:
+            raise OptionError(f"--view.size {self.size}: at least 32 pixels are needed")
+        if not 0 <= self.elevation <= 90:
+            raise OptionError(f"--view.elevation {self.elevation}: must be 0 to 90 degrees")
+        if self.step <= 0:
+            raise OptionError(f"--view.step {self.step}: must be positive")
+        if not 0 < self.opacity < 1:
+            raise OptionError(f"--view.opacity {self.opacity}: must be between 0 and 1")
+        if self.gamma is not None and self.gamma <= 0:
+            raise OptionError(f"--view.gamma {self.gamma}: must be positive")
+
+
+@dataclass(frozen=True)
+class PoolConfig:
+    """The states that rollouts start from."""
+
+    size: int = 64
+    """States kept."""
+    reseed_every: int = 8
+    """Every so many iterations a state is started again from zero."""
+    limit: float = 4.0
+    """A state with a value beyond this has exploded and is thrown away."""
+
+    def __post_init__(self) -> None:
+        if self.size < 1 or self.reseed_every < 1 or self.limit <= 0:
+            raise OptionError("--pool: size, reseed-every and limit must be positive")
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """How a rule is trained."""
+
+    rule: RuleConfig = field(default_factory=RuleConfig)
+    appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
+    view: ViewConfig = field(default_factory=ViewConfig)
+    pool: PoolConfig = field(default_factory=PoolConfig)
+    iterations: int = 300
+    """Iterations of training."""
+    learning_rate: float = 1e-3
+    """Adam's learning rate at the start."""
+    milestones: tuple[float, ...] = (0.6, 0.85)
+    """Parts of the iterations after which the learning rate falls."""
+    decay: float = 0.4
+    """What the learning rate is multiplied by at a milestone."""
+    shortest_rollout: int = 12
+    """Fewest steps of the automaton in an iteration."""
+    longest_rollout: int = 32
+    """Most steps of the automaton in an iteration."""
+    overflow: float = 100.0
+    """Weight of the penalty on states beyond ±1."""
+    reach: int = 2
+    """Cells live up to this far from the smoke."""
+    features: str = "edges"
+    """Weights of VGG16: edges, imagenet or a path."""
+    seed: int = 0
+    """Same seed, same machine, same result."""
+
+    def __post_init__(self) -> None:
+        if self.iterations < 1:
+            raise OptionError(f"--iterations {self.iterations}: at least 1 is needed")
+        if self.learning_rate <= 0 or self.decay <= 0:
+            raise OptionError("--learning-rate and --decay must be positive")
+        if not 1 <= self.shortest_rollout <= self.longest_rollout:
+            raise OptionError(
+                f"--shortest-rollout {self.shortest_rollout}: must be from 1 to "
+                f"--longest-rollout ({self.longest_rollout})"
+            )
+        if self.reach < 0 or self.overflow < 0:
+            raise OptionError("--reach and --overflow must not be negative")
+
+
+PRESETS = {
+    "draft": TrainConfig(),
+    "standard": TrainConfig(
+        iterations=2000,
+        learning_rate=1e-3,
+        longest_rollout=48,
+        view=ViewConfig(size=192),
+        pool=PoolConfig(size=128),
+        rule=RuleConfig(hidden=128),
+    ),
+    "paper": TrainConfig(
+        iterations=5000,
+        learning_rate=1e-3,
+        shortest_rollout=32,
+        longest_rollout=96,
+        view=ViewConfig(size=256, elevation=0.0, render_mode="paper"),
+        pool=PoolConfig(size=256),
+        rule=RuleConfig(hidden=128),
+        appearance=dataclasses.replace(AppearanceConfig(), pixels=0.0),
+    ),
+}
+"""Training by name: `draft` in minutes on two cores, `standard` overnight or on a GPU, `paper` as
+the paper describes it."""

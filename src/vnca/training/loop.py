@@ -1,0 +1,197 @@
+"""Training: roll a state out, look at it, compare it with the style, improve the rule.
+
+Reference: VNCA section 3.4.
+"""
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from vnca.automaton.rule import DENSITY_CHANGE, Rule, Scales
+from vnca.features.vgg import VGG16
+from vnca.kernels.update.mask import changing_rows
+from vnca.kernels.update.reference import Weights, update
+from vnca.kernels.update.stencil import stencil
+from vnca.losses.appearance import AppearanceLoss
+from vnca.losses.overflow import overflow
+from vnca.render.colour import linear_to_srgb
+from vnca.render.view import View
+from vnca.training.config import TrainConfig
+from vnca.training.pool import Pool
+from vnca.training.scene import Scene, density_scale, gamma_for_opacity, velocity_scale
+from vnca.typing import FloatArray
+from vnca.volume import Volume
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What one iteration did.
+
+    Attributes:
+        iteration: Counted from 1.
+        loss: The total that was minimised.
+        terms: Its parts, weighted.
+        exploded: Whether the state left the range and was thrown away.
+    """
+
+    iteration: int
+    loss: float
+    terms: dict[str, float]
+    exploded: bool
+
+
+class Trainer:
+    """A rule in training on one frame and one style picture.
+
+    Every random choice comes from `config.seed`: same seed, same machine, same rule.
+
+    Attributes:
+        config: The hyperparameters.
+        scene: The frame.
+        iteration: Iterations done.
+    """
+
+    def __init__(
+        self,
+        smoke: Volume,
+        style: FloatArray,
+        config: TrainConfig,
+        vgg: VGG16,
+        *,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        """Prepare training.
+
+        Args:
+            smoke: The frame.
+            style: Linear RGB `[r, c, 3]`.
+            config: The hyperparameters.
+            vgg: The frozen network that judges pictures.
+            device: Where to compute.
+
+        Raises:
+            GridError: If there is no smoke in the frame.
+        """
+        self.config = config
+        self.iteration = 0
+        rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
+        self._rule = rule
+        self.scene = Scene(smoke, rule, reach=config.reach, device=device)
+        self._weights = Weights(
+            *(
+                torch.tensor(w, device=device, requires_grad=True)
+                for w in (rule.hidden, rule.bias, rule.output)
+            )
+        )
+        self._stencil = torch.from_numpy(
+            stencil(
+                sobel_divisor=config.rule.sobel_divisor,
+                laplacian_divisor=config.rule.laplacian_divisor,
+            )
+        ).to(device)
+        self._appearance = AppearanceLoss(vgg, style, config.appearance, config.view.size)
+        self._random = np.random.default_rng(config.seed)
+        self._generator = torch.Generator().manual_seed(config.seed)
+        self._pool = Pool(self.scene.seed(config.rule.channels), config.pool, self._random)
+        self._optimiser = torch.optim.Adam(self._weights, lr=config.learning_rate)
+        self._schedule = torch.optim.lr_scheduler.MultiStepLR(
+            self._optimiser,
+            [max(1, round(part * config.iterations)) for part in config.milestones],
+            config.decay,
+        )
+        self._steps = 0  # of all rollouts: no two share a mask
+
+    @property
+    def background(self) -> Tensor:
+        """Linear RGB `[3]` that pictures are composited over: the style's mean colour."""
+        return self._appearance.background
+
+    def run(self) -> Iterator[Progress]:
+        """Train for the remaining iterations, one at a time."""
+        while self.iteration < self.config.iterations:
+            yield self.improve()
+
+    def improve(self) -> Progress:
+        """One iteration: rollout, picture, loss, gradient step."""
+        config = self.config
+        place, state = self._pool.draw(self.iteration)
+        steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
+        state = self.roll(state, steps)
+        picture, opacity = self._picture(self._random_view(state))
+        appearance = self._appearance(picture, opacity, self._generator)
+        penalty = config.overflow * self._overflow(state[:-1])
+        loss = appearance.total + penalty
+        kept = self._pool.put(place, state)
+        if bool(torch.isfinite(loss)):
+            self._optimiser.zero_grad()
+            loss.backward()
+            self._normalise_gradients()
+            self._optimiser.step()
+        self._schedule.step()
+        self.iteration += 1
+        terms = {name: float(value.detach()) for name, value in appearance.terms.items()}
+        return Progress(
+            iteration=self.iteration,
+            loss=float(loss.detach()),
+            terms={**terms, "overflow": float(penalty.detach())},
+            exploded=not kept,
+        )
+
+    def roll(self, state: Tensor, steps: int) -> Tensor:
+        """The state after some steps of the rule; differentiable in the weights."""
+        for _ in range(steps):
+            rows = changing_rows(
+                self.scene.domain.hashes,
+                seed=self.config.seed,
+                step=self._steps,
+                probability=self.config.rule.update_probability,
+            )
+            state = update(
+                state,
+                torch.from_numpy(rows).to(state.device),
+                self.scene.neighbours,
+                self.scene.priors,
+                self._weights,
+                self._stencil,
+            )
+            self._steps += 1
+        return state
+
+    def rule(self) -> Rule:
+        """The rule as it is now."""
+        hidden, bias, output = (w.detach().cpu().numpy().copy() for w in self._weights)
+        return dataclasses.replace(self._rule, hidden=hidden, bias=bias, output=output)
+
+    def _random_view(self, state: Tensor) -> View:
+        """The state from anywhere around the smoke."""
+        view = self.config.view
+        azimuth = self._random.uniform(0, 360)
+        elevation = self._random.uniform(-view.elevation, view.elevation)
+        return self.scene.look(state, self.scene.camera(azimuth, elevation), view)
+
+    def _picture(self, view: View) -> tuple[Tensor, Tensor]:
+        """As the appearance loss wants it: sRGB `[1, 3, r, c]` and opacity `[1, r, c]`."""
+        picture = linear_to_srgb(view.over(self.background))
+        return picture.permute(2, 0, 1)[None], view.opacity[None]
+
+    @staticmethod
+    def _overflow(cells: Tensor) -> Tensor:
+        """States beyond ±1, and beyond ±½ where they are shown: a clamped colour learns nothing."""
+        return overflow(cells) + overflow(2 * cells[:, : DENSITY_CHANGE + 1])
+
+    def _normalise_gradients(self) -> None:
+        """Give each gradient unit length: rollouts of any length then teach equally much."""
+        for weight in self._weights:
+            if weight.grad is not None:
+                weight.grad /= weight.grad.norm() + 1e-8
+
+
+def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:
+    """Normalisers from the frame a rule is trained on."""
+    density = density_scale(smoke.density)
+    gamma = config.view.gamma or gamma_for_opacity(smoke.density / density, config.view.opacity)
+    return Scales(density=density, velocity=velocity_scale(smoke), gamma=gamma)

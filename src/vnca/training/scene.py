@@ -1,0 +1,145 @@
+"""The one frame a rule is trained on, ready for rollouts and pictures."""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from vnca.automaton.domain import Domain
+from vnca.automaton.priors import priors
+from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
+from vnca.camera import Camera, frame_box
+from vnca.errors import GridError
+from vnca.render.colour import srgb_to_linear
+from vnca.render.view import View, render
+from vnca.training.config import ViewConfig
+from vnca.typing import AnyArray, Box
+from vnca.volume import Volume
+
+
+class Scene:
+    """Smoke on which states are rolled out and looked at; nothing in it changes.
+
+    Attributes:
+        domain: The cells that live.
+        rows: `[27, n]` neighbours of each cell.
+        priors: `[n, 7]`.
+    """
+
+    def __init__(
+        self, smoke: Volume, rule: Rule, *, reach: int, device: torch.device | str = "cpu"
+    ) -> None:
+        """Prepare a frame.
+
+        Args:
+            smoke: The frame; must hold smoke.
+            rule: Its normalisers and switches are used, not its weights.
+            reach: Cells live up to this far from the smoke.
+            device: Where rollouts and pictures are computed.
+
+        Raises:
+            GridError: If there is no smoke in the frame.
+        """
+        self.box = smoke_bounds(smoke, rule.scales.density)
+        self.domain = Domain.around_smoke(
+            smoke.density,
+            smoke.origin,
+            threshold=SMOKE_THRESHOLD * rule.scales.density,
+            reach=reach,
+            box=self.box.grown(reach),
+        )
+        self.gamma = rule.scales.gamma
+        self.neighbours = torch.from_numpy(self.domain.neighbours).to(device)
+        self.priors = torch.from_numpy(priors(self.domain, smoke, rule)).to(device)
+        density = self.domain.gather(smoke.density, smoke.origin) / rule.scales.density
+        self._density = torch.from_numpy(density.astype(np.float32)).to(device)
+        at = self.domain.cells - np.asarray(self.domain.box.lower)
+        flat = np.ravel_multi_index(tuple(at.T), self.domain.box.shape)
+        self._flat = torch.from_numpy(flat).to(device)
+
+    def seed(self, channels: int) -> Tensor:
+        """The state every rollout starts from, zeros `[n + 1, channels]`."""
+        return torch.from_numpy(self.domain.seed(channels)).to(self.priors.device)
+
+    def camera(self, azimuth: float, elevation: float, *, aspect: float = 1.0) -> Camera:
+        """A camera around the smoke, framed on its bounding box."""
+        lower, upper = (np.asarray(c) - self.domain.box.lower for c in self.box)
+        return frame_box(
+            (lower - 0.5).tolist(), (upper - 0.5).tolist(), azimuth, elevation, aspect=aspect
+        )
+
+    def look(
+        self, state: Tensor, camera: Camera, view: ViewConfig, *, size: int | None = None
+    ) -> View:
+        """The smoke as `state` paints it; differentiable in the state."""
+        cells = state[:-1]
+        colour = srgb_to_linear((cells[:, COLOUR] + 0.5).clamp(0, 1))
+        change = cells[:, DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
+        size = size or view.size
+        return render(
+            self._dense(self._density * (1 + change)),
+            self._dense(colour),
+            camera,
+            rows=size,
+            columns=size,
+            gamma=self.gamma,
+            step=view.step,
+            mode="paper" if view.render_mode == "paper" else "sane",
+        )
+
+    def _dense(self, values: Tensor) -> Tensor:
+        shape = self.domain.box.shape
+        field = values.new_zeros(int(np.prod(shape)), *values.shape[1:])
+        return field.index_copy(0, self._flat, values).view(*shape, *values.shape[1:])
+
+
+def smoke_bounds(smoke: Volume, density_scale: float) -> Box:
+    """The box of the cells that count as smoke.
+
+    Raises:
+        GridError: If there are none.
+    """
+    cells = np.argwhere(smoke.density > SMOKE_THRESHOLD * density_scale)
+    if len(cells) == 0:
+        raise GridError(
+            f"frame {smoke.frame}: there is no smoke in it to train on; choose a later frame"
+        )
+    lower, upper = cells.min(axis=0), cells.max(axis=0) + 1
+    x, y, z = (lower + smoke.origin).tolist()
+    u, v, w = (upper + smoke.origin).tolist()
+    return Box((x, y, z), (u, v, w))
+
+
+def density_scale(density: AnyArray) -> float:
+    """The density that counts as 1: the 99th percentile of what is not empty."""
+    smoke = density[density > 0]
+    return float(np.percentile(smoke, 99)) if len(smoke) else 1.0
+
+
+def velocity_scale(smoke: Volume) -> float:
+    """Cells per frame that count as 1: the root mean square speed inside the smoke."""
+    if smoke.velocity is None:
+        return 1.0
+    speed = np.linalg.norm(smoke.velocity[smoke.density > 0], axis=-1)
+    return max(float(np.sqrt(np.mean(speed**2))), 1e-3) if len(speed) else 1.0
+
+
+def gamma_for_opacity(density: AnyArray, opacity: float) -> float:
+    """Extinction γ of density 1 at which the smoke has the given opacity, per cell.
+
+    Seen along each axis in turn; the mean is over the pixels whose optical depth is at least a
+    tenth of the deepest, so that faint fringes do not count.
+
+    Args:
+        density: `[x, y, z]`, normalised.
+        opacity: Mean opacity wanted, in (0, 1).
+    """
+    depths = [density.sum(axis=axis).ravel() for axis in range(3)]
+    depth = np.concatenate([d[d > 0.1 * d.max()] for d in depths]).astype(np.float64)
+    low, high = 1e-6, 1e6
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        if np.mean(1 - np.exp(-middle * depth)) < opacity:
+            low = middle
+        else:
+            high = middle
+    return float(high)
