@@ -3,7 +3,6 @@
 Everything here is about positions only, so nothing is differentiated.
 """
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -19,15 +18,27 @@ SAMPLES_AT_ONCE = 1 << 23
 class Samples:
     """Sample positions on the rays that meet smoke.
 
+    A table with a row for each such ray holds them packed to the front, near to far; the rest
+    of a row stays empty.
+
     Attributes:
-        ray: `[rays]`, which of the rays marched this is.
-        depth: `[rays, samples]`, ascending, then NaN where a ray has fewer samples than others.
-        points: `[rays, samples, 3]`, cell coordinates; behind all smoke where depth is NaN.
+        points: `[n, 3]`, cell coordinates of the samples.
+        row: `[n]`, row of each sample in the table.
+        column: `[n]`, its column.
+        depth: `[rows, columns]`, the depths as such a table; zero where it is empty.
+        ray: `[rows]`, which of the rays marched each row is.
     """
 
-    ray: Tensor
-    depth: Tensor
     points: Tensor
+    row: Tensor
+    column: Tensor
+    depth: Tensor
+    ray: Tensor
+
+    def table(self, values: Tensor) -> Tensor:
+        """Values at the points, `[n, c]`, as `[rows, columns, c]`. Differentiable."""
+        empty = values.new_zeros(*self.depth.shape, values.shape[1])
+        return empty.index_put((self.row, self.column), values)
 
 
 @torch.no_grad()
@@ -71,20 +82,20 @@ def march(
         k = first[rays, None] + torch.arange(longest, device=density.device)
         depth = (k + offset) * step
         points = torch.addcmul(origin, depth[..., None], direction)
-        kept = torch.nonzero(_look_up(reach, points) & (k < (first + count)[rays, None]))
-        if not len(kept):
-            continue
-        row, column = kept.unbind(1)
-        per_ray = torch.bincount(row, minlength=len(rays))
-        starts = torch.cumsum(per_ray, 0) - per_ray
-        rank = torch.arange(len(row), device=row.device) - starts[row]
-        packed = depth.new_full((len(rays), int(per_ray.max())), math.nan)
-        packed[row, rank] = depth[row, column]
-        some = per_ray > 0
-        packed, origin, direction = packed[some], origin[some], direction[some]
-        reached = torch.where(packed.isnan(), leave[rays][some, None] + 1, packed)
-        points = torch.addcmul(origin, reached[..., None], direction)
-        yield Samples(rays[some], packed, points)
+        inside = k < (first + count)[rays, None]
+        row, column = torch.nonzero(inside & _look_up(reach, points), as_tuple=True)
+        if len(row):
+            yield _pack(points[row, column], depth[row, column], row, rays)
+
+
+def _pack(points: Tensor, depth: Tensor, ray: Tensor, rays: Tensor) -> Samples:
+    """Sort samples, given in order of ray and depth, into a table without empty rows."""
+    met, row, count = torch.unique_consecutive(ray, return_inverse=True, return_counts=True)
+    starts = torch.cumsum(count, 0) - count
+    column = torch.arange(len(row), device=row.device) - starts[row]
+    table = depth.new_zeros(len(met), int(count.max()))
+    table[row, column] = depth
+    return Samples(points, row, column, table, rays[met])
 
 
 def _bounds(smoke: Tensor) -> tuple[Tensor, Tensor]:

@@ -90,7 +90,7 @@ def render(
     field = torch.cat([density[..., None], density[..., None] * colour], dim=-1)
     pixels, colours, opacities, depths = [], [], [], []
     for samples in march(density, origins, directions, near=camera.near, step=step, offset=offset):
-        values = sample(field, samples.points.view(-1, 3)).view(*samples.depth.shape, 4)
+        values = samples.table(sample(field, samples.points))
         thickness = values[..., 0]
         hue = values[..., 1:] / thickness[..., None].clamp_min(_THINNEST)
         if mode == "paper":
@@ -100,7 +100,7 @@ def render(
         pixels.append(samples.ray)
         colours.append(gather(weights, hue))
         opacities.append(1 - transmittance)
-        depths.append(_mean_depth(weights, samples.depth.nan_to_num(0)))
+        depths.append(_mean_depth(weights, samples.depth))
     return View(
         _picture(pixels, colours, density.new_zeros(rows * columns, 3)).view(rows, columns, 3),
         _picture(pixels, opacities, density.new_zeros(rows * columns)).view(rows, columns),
