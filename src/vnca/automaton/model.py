@@ -13,13 +13,14 @@ from safetensors.numpy import save_file
 
 import vnca
 from vnca.automaton.rule import Rule, RuleConfig, Scales
-from vnca.errors import ModelError
+from vnca.errors import ModelError, OptionError, ShapeError
 from vnca.files import existing_file, whole_file
 
 FORMAT_VERSION = 1
 MODEL_NAME = "model.safetensors"
 """Name of the model in a run folder."""
 
+_METADATA = "vnca"
 _WEIGHTS = ("hidden", "bias", "output")
 
 
@@ -51,13 +52,17 @@ class Model:
         }
         if self.style is not None:
             tensors["style"] = np.ascontiguousarray(self.style)
+        # One entry: safetensors keeps several in no order, and equal models are equal bytes.
         metadata = {
-            "format": "vnca",
-            "format_version": str(FORMAT_VERSION),
-            "version": self.version,
-            "rule": json.dumps(dataclasses.asdict(self.rule.config)),
-            "scales": json.dumps(dataclasses.asdict(self.rule.scales)),
-            "training": json.dumps(self.training),
+            _METADATA: json.dumps(
+                {
+                    "format_version": FORMAT_VERSION,
+                    "version": self.version,
+                    "rule": dataclasses.asdict(self.rule.config),
+                    "scales": dataclasses.asdict(self.rule.scales),
+                    "training": self.training,
+                }
+            )
         }
         with whole_file(path) as temporary:
             save_file(tensors, temporary, metadata=metadata)
@@ -82,30 +87,29 @@ class Model:
                 tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         except (SafetensorError, OSError, ValueError, TypeError) as error:
             raise ModelError(f"{path}: not a vnca model ({error})") from error
-        if metadata.get("format") != "vnca":
+        if _METADATA not in metadata:
             raise ModelError(f"{path}: a safetensors file, but not a vnca model")
-        _check_format(path, metadata.get("format_version", ""))
         try:
+            described = json.loads(metadata[_METADATA])
+            _check_format(path, described["format_version"])
             rule = Rule(
                 **{name: tensors[name].astype(np.float32) for name in _WEIGHTS},
-                config=RuleConfig(**json.loads(metadata["rule"])),
-                scales=Scales(**json.loads(metadata["scales"])),
+                config=RuleConfig(**described["rule"]),
+                scales=Scales(**described["scales"]),
             )
-            training = json.loads(metadata["training"])
-        except (KeyError, TypeError, ValueError) as error:
+            training, version = dict(described["training"]), str(described["version"])
+        except (KeyError, TypeError, ValueError, OptionError) as error:
             raise ModelError(f"{path}: damaged model metadata ({error})") from error
-        except ModelError as error:
+        except ShapeError as error:
             raise ModelError(f"{path}: {error}") from error
         style = tensors.get("style")
         if style is not None and (style.dtype != np.uint8 or style.ndim != 3):
             raise ModelError(f"{path}: the style thumbnail is not an 8-bit picture")
-        return cls(rule, training, style, metadata.get("version", "unknown"))
+        return cls(rule, training, style, version)
 
 
-def _check_format(path: Path, version: str) -> None:
-    if not version.isdecimal():
-        raise ModelError(f"{path}: the model has no format version")
-    if int(version) > FORMAT_VERSION:
+def _check_format(path: Path, version: int) -> None:
+    if version > FORMAT_VERSION:
         raise ModelError(
             f"{path}: model format {version} is newer than this vnca reads ({FORMAT_VERSION}); "
             "upgrade vnca"

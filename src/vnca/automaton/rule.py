@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vnca.errors import ModelError, OptionError
+from vnca.errors import OptionError, ShapeError
 from vnca.kernels.update.stencil import FILTERS
 from vnca.typing import FloatArray
 
@@ -97,9 +97,9 @@ class Rule:
         for name, shape in expected.items():
             weights = getattr(self, name)
             if weights.shape != shape:
-                raise ModelError(f"weights '{name}': expected shape {shape}, got {weights.shape}")
+                raise ShapeError(f"weights '{name}': expected shape {shape}, got {weights.shape}")
             if not np.isfinite(weights).all():
-                raise ModelError(f"weights '{name}': not all finite")
+                raise ShapeError(f"weights '{name}': not all finite")
 
     @classmethod
     def initial(cls, config: RuleConfig, scales: Scales, *, seed: int) -> "Rule":

@@ -1,1 +1,73 @@
 """The command line, one file a subcommand."""
+
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+
+import vnca
+from vnca.errors import VncaError
+
+COMMANDS = {
+    "demo": "simulate, train, stylize and film a small plume, from nothing",
+    "simulate": "write a smoke simulation to play with",
+    "train": "learn a rule from one frame of smoke and one picture",
+    "stylize": "paint a smoke sequence with a trained rule",
+    "render": "make a film or a turntable of a sequence",
+    "info": "describe a volume file, a model or a training run",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a subcommand; the exit code is 2 where the user can mend what went wrong.
+
+    Each subcommand is a module of this package with a function `run(arguments)`. It is imported
+    only when it is called, so that `vnca info` never waits for torch.
+    """
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(_usage())
+        return 0 if arguments else 2
+    name, *rest = arguments
+    if name in ("-V", "--version"):
+        print(f"vnca {vnca.__version__}")
+        return 0
+    if name not in COMMANDS:
+        return _failed(f"'{name}' is not a command; expected one of {', '.join(COMMANDS)}")
+    try:
+        importlib.import_module(f"vnca.cli.{name}").run(rest)
+    except VncaError as error:
+        return _failed(str(error))
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("vnca"):
+            raise
+        return _failed(f"'vnca {name}' needs {error.name}: pip install 'vnca[train]'")
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output went away, as `head` does; Python would complain at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0
+
+
+def _failed(message: str) -> int:
+    print(f"vnca: {message}", file=sys.stderr)
+    return 2
+
+
+def _usage() -> str:
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:{width}}  {what}" for name, what in COMMANDS.items()]
+    return "\n".join(
+        [
+            "usage: vnca COMMAND [OPTIONS]",
+            "",
+            "Turn smoke simulations into moving paintings.",
+            "",
+            "commands:",
+            *lines,
+            "",
+            "`vnca COMMAND --help` lists the options of a command.",
+        ]
+    )

@@ -2,6 +2,9 @@
 
 import dataclasses
 from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+import tyro
 
 from vnca.automaton.rule import RuleConfig
 from vnca.errors import OptionError
@@ -18,8 +21,8 @@ class ViewConfig:
     """Views come from up to this many degrees above or below the horizon."""
     step: float = 1.0
     """Distance between samples along a ray, cells."""
-    render_mode: str = "sane"
-    """Integrand: `sane` (emission-absorption) or `paper` (as printed in the paper)."""
+    mode: Literal["sane", "paper"] = "sane"
+    """Integrand: emission and absorption, or the paper's as printed."""
     opacity: float = 0.97
     """Without a given gamma, one is chosen that makes the smoke this opaque, seen from afar."""
     gamma: float | None = None
@@ -58,7 +61,7 @@ class PoolConfig:
 class TrainConfig:
     """How a rule is trained."""
 
-    rule: RuleConfig = field(default_factory=RuleConfig)
+    rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = field(default_factory=RuleConfig)
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     pool: PoolConfig = field(default_factory=PoolConfig)
@@ -112,7 +115,7 @@ PRESETS = {
         learning_rate=1e-3,
         shortest_rollout=32,
         longest_rollout=96,
-        view=ViewConfig(size=256, elevation=0.0, render_mode="paper"),
+        view=ViewConfig(size=256, elevation=0.0, mode="paper"),
         pool=PoolConfig(size=256),
         rule=RuleConfig(hidden=128),
         appearance=dataclasses.replace(AppearanceConfig(), pixels=0.0),

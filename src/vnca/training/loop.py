@@ -4,7 +4,7 @@ Reference: VNCA section 3.4.
 """
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,11 +18,12 @@ from vnca.kernels.update.reference import Weights, update
 from vnca.kernels.update.stencil import stencil
 from vnca.losses.appearance import AppearanceLoss
 from vnca.losses.overflow import overflow
+from vnca.render.brightness import gamma_for_opacity
 from vnca.render.colour import linear_to_srgb
 from vnca.render.view import View
 from vnca.training.config import TrainConfig
 from vnca.training.pool import Pool
-from vnca.training.scene import Scene, density_scale, gamma_for_opacity, velocity_scale
+from vnca.training.scene import Scene, density_scale, velocity_scale
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
@@ -110,6 +111,11 @@ class Trainer:
         """Linear RGB `[3]` that pictures are composited over: the style's mean colour."""
         return self._appearance.background
 
+    @property
+    def learning_rate(self) -> float:
+        """Adam's learning rate in the next iteration."""
+        return float(self._schedule.get_last_lr()[0])
+
     def run(self) -> Iterator[Progress]:
         """Train for the remaining iterations, one at a time."""
         while self.iteration < self.config.iterations:
@@ -120,7 +126,8 @@ class Trainer:
         config = self.config
         place, state = self._pool.draw(self.iteration)
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
-        state = self.roll(state, steps)
+        state = self._roll(state, range(self._steps, self._steps + steps))
+        self._steps += steps
         picture, opacity = self._picture(self._random_view(state))
         appearance = self._appearance(picture, opacity, self._generator)
         penalty = config.overflow * self._overflow(state[:-1])
@@ -141,13 +148,18 @@ class Trainer:
             exploded=not kept,
         )
 
-    def roll(self, state: Tensor, steps: int) -> Tensor:
-        """The state after some steps of the rule; differentiable in the weights."""
-        for _ in range(steps):
+    def grow(self, steps: int) -> Tensor:
+        """A state grown from the seed, as stylizing does; no random stream moves."""
+        with torch.no_grad():
+            return self._roll(self.scene.seed(self.config.rule.channels), range(steps))
+
+    def _roll(self, state: Tensor, steps: Iterable[int]) -> Tensor:
+        """The state after the numbered steps of the rule; differentiable in the weights."""
+        for step in steps:
             rows = changing_rows(
                 self.scene.domain.hashes,
                 seed=self.config.seed,
-                step=self._steps,
+                step=step,
                 probability=self.config.rule.update_probability,
             )
             state = update(
@@ -158,7 +170,6 @@ class Trainer:
                 self._weights,
                 self._stencil,
             )
-            self._steps += 1
         return state
 
     def rule(self) -> Rule:

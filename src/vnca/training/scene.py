@@ -7,7 +7,7 @@ from torch import Tensor
 from vnca.automaton.domain import Domain
 from vnca.automaton.priors import priors
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
-from vnca.camera import Camera, frame_box
+from vnca.camera import Camera, Orthographic, Perspective, frame_box
 from vnca.errors import GridError
 from vnca.render.colour import srgb_to_linear
 from vnca.render.view import View, render
@@ -60,7 +60,9 @@ class Scene:
         """The state every rollout starts from, zeros `[n + 1, channels]`."""
         return torch.from_numpy(self.domain.seed(channels)).to(self.priors.device)
 
-    def camera(self, azimuth: float, elevation: float, *, aspect: float = 1.0) -> Camera:
+    def camera(
+        self, azimuth: float, elevation: float, *, aspect: float = 1.0
+    ) -> Orthographic | Perspective:
         """A camera around the smoke, framed on its bounding box."""
         lower, upper = (np.asarray(c) - self.domain.box.lower for c in self.box)
         return frame_box(
@@ -83,7 +85,7 @@ class Scene:
             columns=size,
             gamma=self.gamma,
             step=view.step,
-            mode="paper" if view.render_mode == "paper" else "sane",
+            mode=view.mode,
         )
 
     def _dense(self, values: Tensor) -> Tensor:
@@ -121,25 +123,3 @@ def velocity_scale(smoke: Volume) -> float:
         return 1.0
     speed = np.linalg.norm(smoke.velocity[smoke.density > 0], axis=-1)
     return max(float(np.sqrt(np.mean(speed**2))), 1e-3) if len(speed) else 1.0
-
-
-def gamma_for_opacity(density: AnyArray, opacity: float) -> float:
-    """Extinction γ of density 1 at which the smoke has the given opacity, per cell.
-
-    Seen along each axis in turn; the mean is over the pixels whose optical depth is at least a
-    tenth of the deepest, so that faint fringes do not count.
-
-    Args:
-        density: `[x, y, z]`, normalised.
-        opacity: Mean opacity wanted, in (0, 1).
-    """
-    depths = [density.sum(axis=axis).ravel() for axis in range(3)]
-    depth = np.concatenate([d[d > 0.1 * d.max()] for d in depths]).astype(np.float64)
-    low, high = 1e-6, 1e6
-    for _ in range(60):
-        middle = np.sqrt(low * high)
-        if np.mean(1 - np.exp(-middle * depth)) < opacity:
-            low = middle
-        else:
-            high = middle
-    return float(high)

@@ -1,0 +1,157 @@
+"""Filming painted frames as they come."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+import torch
+
+from vnca.camera import frame_box
+from vnca.colour import srgb_to_linear
+from vnca.errors import OptionError
+from vnca.io.video import FilmWriter
+from vnca.render.view import View, render
+from vnca.typing import Box, FloatArray, Index
+
+
+@dataclass(frozen=True)
+class FilmConfig:
+    """How smoke is filmed."""
+
+    rows: int = 384
+    """Height of the film, pixels."""
+    columns: int = 384
+    """Width of the film, pixels."""
+    azimuth: float = 0.0
+    """Where the camera stands, degrees around the smoke; 0 is the front, looking along +y."""
+    elevation: float = 5.0
+    """How far above the horizon it stands, degrees."""
+    turn: float = 0.0
+    """Degrees the camera walks around the smoke over the whole film; 360 is a turntable."""
+    field_of_view: float = 30.0
+    """Vertical, degrees; 0 films without perspective."""
+    fps: float = 24.0
+    """Frames per second."""
+    background: str = "#101014"
+    """Colour behind the smoke, #rrggbb."""
+
+    def __post_init__(self) -> None:
+        if self.rows < 16 or self.columns < 16:
+            raise OptionError("--film.rows and --film.columns: at least 16 pixels are needed")
+        if self.fps <= 0:
+            raise OptionError(f"--film.fps {self.fps}: must be positive")
+        if not 0 <= self.field_of_view < 120:
+            raise OptionError(f"--film.field-of-view {self.field_of_view}: must be 0 to 120")
+        parse_colour(self.background)
+
+
+class Film:
+    """A film of smoke, seen by a camera framed on a whole sequence."""
+
+    def __init__(
+        self, path: Path, config: FilmConfig, box: Box, *, frames: int, device: torch.device
+    ) -> None:
+        """Open the film; it appears under its name when the context ends well.
+
+        Args:
+            path: mp4, gif or webp.
+            config: How to film.
+            box: What to keep in view, index coordinates.
+            frames: How many will come, which sets the pace of a turning camera.
+            device: Where to render.
+        """
+        self._config, self._box, self._frames, self._device = config, box, frames, device
+        self._writer = FilmWriter(path, fps=config.fps)
+        self._shown = 0
+
+    def __enter__(self) -> "Film":
+        """Start writing."""
+        self._writer.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Finish the film, or drop it if something failed."""
+        self._writer.__exit__(kind, error, trace)
+
+    def add(
+        self, density: FloatArray, colour: FloatArray, origin: Index, *, gamma: float
+    ) -> FloatArray:
+        """Render the next frame, add it and return it, linear RGB `[rows, columns, 3]`.
+
+        Args:
+            density: `[x, y, z]`.
+            colour: Linear RGB `[x, y, z, 3]`.
+            origin: Index coordinates of the first cell.
+            gamma: Extinction of density 1, per cell.
+        """
+        view = picture(
+            density,
+            colour,
+            origin,
+            self._config,
+            box=self._box,
+            gamma=gamma,
+            turned=self._config.turn * self._shown / self._frames,
+            device=self._device,
+        )
+        frame = view.over(parse_colour(self._config.background)).clamp(0, 1).cpu().numpy()
+        self._writer.add(frame)
+        self._shown += 1
+        return frame
+
+
+def picture(
+    density: FloatArray,
+    colour: FloatArray,
+    origin: Index,
+    config: FilmConfig,
+    *,
+    box: Box,
+    gamma: float,
+    turned: float,
+    device: torch.device,
+) -> View:
+    """The view of one frame by a camera framed on `box` that has turned by some degrees."""
+    lower = (np.asarray(box.lower) - origin - 0.5).tolist()
+    upper = (np.asarray(box.upper) - origin - 0.5).tolist()
+    camera = frame_box(
+        lower,
+        upper,
+        config.azimuth + turned,
+        config.elevation,
+        aspect=config.columns / config.rows,
+        field_of_view=config.field_of_view or None,
+    )
+    if density.size == 0:
+        density, colour = np.zeros((1, 1, 1), np.float32), np.zeros((1, 1, 1, 3), np.float32)
+    with torch.no_grad():
+        return render(
+            torch.from_numpy(density).to(device),
+            torch.from_numpy(colour).to(device),
+            camera,
+            rows=config.rows,
+            columns=config.columns,
+            gamma=gamma,
+        )
+
+
+def parse_colour(text: str) -> list[float]:
+    """Linear RGB of `#rrggbb`.
+
+    Raises:
+        OptionError: If the text is not such a colour.
+    """
+    digits = text.removeprefix("#")
+    try:
+        values = bytes.fromhex(digits)
+    except ValueError:
+        values = b""
+    if len(values) != 3:
+        raise OptionError(f"background '{text}': expected a colour such as #101014")
+    return srgb_to_linear(np.frombuffer(values, np.uint8) / 255).tolist()

@@ -1,0 +1,33 @@
+"""From dataclasses to options: the one place that knows how a command line is read."""
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+import tyro
+
+T = TypeVar("T")
+
+
+def parse(command: str, options: Callable[..., T], arguments: Sequence[str], **keywords: Any) -> T:
+    """An instance of the dataclass `options` from command line arguments.
+
+    Help and the messages for unknown or malformed options come from tyro, which exits with
+    code 2 for the latter.
+    """
+    return tyro.cli(options, prog=f"vnca {command}", args=list(arguments), **keywords)
+
+
+def chosen(arguments: Sequence[str], option: str, default: str) -> str:
+    """The value of an option that has to be known before the others can be read."""
+    for at, word in enumerate(arguments):
+        if word == option and at + 1 < len(arguments):
+            return arguments[at + 1]
+        if word.startswith(f"{option}="):
+            return word.partition("=")[2]
+    return default
+
+
+def say(line: str) -> None:
+    """Tell the user something that is not the result: on standard error."""
+    print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,73 @@
+"""Progress of long work: how far, how fast, how long still."""
+
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+T = TypeVar("T")
+
+# A terminal line is redrawn; a log gets a line now and then.
+_REDRAW_SECONDS = 0.2
+_LOG_SECONDS = 15.0
+
+
+class Progress:
+    """A line on standard error that says how far work has come.
+
+    Usable as a context manager, which ends the line.
+    """
+
+    def __init__(self, what: str, total: int, unit: str) -> None:
+        """Start the clock.
+
+        Args:
+            what: The work, as a present participle: "training".
+            total: How many units there are.
+            unit: What is counted, in the plural: "frames".
+        """
+        self._what, self._total, self._unit = what, total, unit
+        self._start = time.monotonic()
+        self._drawn = -_LOG_SECONDS
+        self._terminal = sys.stderr.isatty()
+
+    def __enter__(self) -> "Progress":
+        """Begin."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the line."""
+        if self._terminal and self._drawn > 0:
+            print(file=sys.stderr)
+
+    def show(self, done: int, note: str = "") -> None:
+        """Say that `done` units are finished; `note` is added at the end of the line."""
+        now = time.monotonic()
+        pause = _REDRAW_SECONDS if self._terminal else _LOG_SECONDS
+        if now - self._drawn < pause and done < self._total:
+            return
+        self._drawn = now
+        elapsed = now - self._start
+        left = elapsed / done * (self._total - done) if done else 0.0
+        rate = f"{done / elapsed:.2f} {self._unit}/s" if done and elapsed > 0 else ""
+        line = (
+            f"{self._what} {done}/{self._total} {self._unit}  {rate}  {_clock(left)} left  {note}"
+        )
+        if self._terminal:
+            print(f"\r\x1b[K{line.rstrip()}", end="", file=sys.stderr, flush=True)
+        else:
+            print(line.rstrip(), file=sys.stderr, flush=True)
+
+
+def tracked(items: Iterable[T], what: str, total: int, unit: str) -> Iterator[T]:
+    """`items`, with their progress shown as each is finished."""
+    with Progress(what, total, unit) as progress:
+        for done, item in enumerate(items):
+            yield item
+            progress.show(done + 1)
+
+
+def _clock(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"

@@ -1,0 +1,79 @@
+import dataclasses
+
+import numpy as np
+
+from vnca.automaton.domain import Domain
+from vnca.automaton.paint import colours, density_factors
+from vnca.automaton.priors import priors
+from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.colour import linear_to_srgb
+from vnca.volume import Volume
+
+SHAPE = (4, 2, 3)
+
+
+def smoke() -> Volume:
+    random = np.random.default_rng(0)
+    return Volume(
+        random.random(SHAPE).astype(np.float32),
+        random.normal(size=(*SHAPE, 3)).astype(np.float32),
+        (5, -2, 0),
+        np.eye(4),
+        1,
+    )
+
+
+def rule(**switches: bool) -> Rule:
+    return Rule.initial(RuleConfig(**switches), Scales(density=0.5, velocity=2.0), seed=0)  # type: ignore[arg-type]
+
+
+def test_cells_are_told_position_density_and_velocity() -> None:
+    volume = smoke()
+    domain = Domain.from_mask(np.ones(SHAPE, bool), volume.origin)
+    values = domain.scatter(priors(domain, volume, rule()), domain.box)
+    np.testing.assert_allclose(values[:, 0, 0, 0], [-0.75, -0.25, 0.25, 0.75])
+    np.testing.assert_allclose(values[0, :, 0, 1], [-0.5, 0.5])
+    np.testing.assert_allclose(values[0, 0, :, 2], [-2 / 3, 0, 2 / 3], atol=1e-7)
+    np.testing.assert_allclose(values[..., 3], volume.density / 0.5)
+    assert volume.velocity is not None
+    np.testing.assert_allclose(values[..., 4:], volume.velocity / 2)
+
+
+def test_cells_outside_the_smoke_are_told_that_there_is_none() -> None:
+    volume = smoke()
+    domain = Domain.from_mask(np.ones((1, 1, 1), bool), (100, 0, 0))
+    assert not priors(domain, volume, rule(position_prior=False)).any()
+
+
+def test_a_prior_that_is_switched_off_and_a_velocity_that_is_missing_are_zero() -> None:
+    volume = smoke()
+    domain = Domain.from_mask(np.ones(SHAPE, bool), volume.origin)
+    off = priors(
+        domain, volume, rule(position_prior=False, density_prior=False, velocity_prior=False)
+    )
+    assert off.shape == (len(domain), 7)
+    assert not off.any()
+    still = priors(domain, dataclasses.replace(volume, velocity=None), rule())
+    assert not still[:, 4:].any()
+
+
+def test_a_density_in_other_units_cannot_blow_a_state_up() -> None:
+    volume = smoke()
+    huge = dataclasses.replace(volume, density=volume.density * 1e6)
+    domain = Domain.from_mask(np.ones(SHAPE, bool), volume.origin)
+    assert np.abs(priors(domain, huge, rule())).max() <= 4
+
+
+def test_the_seed_shows_middle_grey_and_leaves_density_alone() -> None:
+    state = np.zeros((2, 12), dtype=np.float32)
+    np.testing.assert_allclose(linear_to_srgb(colours(state)), 0.5, atol=1e-6)
+    np.testing.assert_array_equal(density_factors(state), 1)
+
+
+def test_colour_and_density_stay_in_range_whatever_the_state() -> None:
+    state = np.random.default_rng(1).normal(scale=10, size=(50, 12)).astype(np.float32)
+    assert colours(state).min() >= 0
+    assert colours(state).max() <= 1
+    factors = density_factors(state)
+    assert (factors.min(), factors.max()) == (0.5, 1.5)
+    assert np.all(density_factors(state, strength=0) == 1)

@@ -1,0 +1,122 @@
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.errors import OptionError
+from vnca.stylize.ahead import read_ahead
+from vnca.stylize.config import StylizeConfig
+from vnca.stylize.roll import Painting, stylize
+from vnca.typing import Box, FloatArray, IntArray
+from vnca.volume import Volume
+
+RULE = Rule.initial(RuleConfig(channels=4, hidden=3), Scales(), seed=0)
+BOX = Box((-10, -10, -10), (20, 20, 20))
+
+
+def counting_step(
+    state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
+) -> FloatArray:
+    """A rule in which a cell counts in its red channel how often it changed, in hundredths."""
+    assert neighbours.shape == (27, len(state) - 1)
+    assert priors.shape == (len(state) - 1, 7)
+    state = state.copy()
+    state[rows, 0] += 0.01
+    return state
+
+
+def ball(frame: int, centre: tuple[int, int, int] = (0, 0, 0), origin: int = 0) -> Volume:
+    cells = np.stack(np.meshgrid(*[np.arange(7)] * 3, indexing="ij"), axis=-1) - 3
+    density = (np.linalg.norm(cells, axis=-1) < 3).astype(np.float32)
+    x, y, z = (c + origin - 3 for c in centre)
+    return Volume(density, None, (x, y, z), np.eye(4), frame)
+
+
+def nothing(frame: int) -> Volume:
+    return Volume(np.zeros((0, 0, 0), np.float32), None, (0, 0, 0), np.eye(4), frame)
+
+
+def rolled(frames: list[Volume], box: Box = BOX, **options: float) -> list[Painting]:
+    config = StylizeConfig(**{"warmup": 6, "steps_per_frame": 2, **options})  # type: ignore[arg-type]
+    return list(stylize(frames, RULE, counting_step, config, box=box))
+
+
+def at(painting: Painting, cell: tuple[int, int, int]) -> float:
+    x, y, z = (c - o for c, o in zip(cell, painting.smoke.origin, strict=True))
+    return float(painting.colour[x, y, z, 0])
+
+
+def test_a_cell_keeps_its_state_while_the_smoke_moves_over_it() -> None:
+    still, moved = rolled([ball(0), ball(1, (2, 0, 0))], steps_per_frame=8)
+    stayed = rolled([ball(0), ball(1)], steps_per_frame=8)[1]
+    assert at(still, (1, 0, 0)) < at(moved, (1, 0, 0))
+    assert at(moved, (1, 0, 0)) == at(stayed, (1, 0, 0))
+
+
+def test_the_painting_is_anchored_in_index_space_whatever_box_the_file_covers() -> None:
+    tight = ball(0)
+    padded = Volume(np.pad(tight.density, 5), None, (-8, -8, -8), np.eye(4), 0)
+    a, b = rolled([tight])[0], rolled([padded])[0]
+    np.testing.assert_array_equal(a.colour[tight.density > 0], b.colour[padded.density > 0])
+
+
+def test_a_frame_without_smoke_passes_through_and_the_painting_starts_afresh() -> None:
+    first, empty, again = rolled([ball(0), nothing(1), ball(2)])
+    assert empty.density.size == 0
+    assert empty.colour.shape == (0, 0, 0, 3)
+    assert np.isfinite(again.colour).all()
+    assert abs(at(first, (0, 0, 0)) - at(again, (0, 0, 0))) < 0.05
+
+
+def test_strengths_fade_colour_and_density_separately() -> None:
+    plain = rolled([ball(0)], strength=0.0, density_strength=0.0)[0]
+    np.testing.assert_array_equal(plain.colour, 1)
+    np.testing.assert_array_equal(plain.density, plain.smoke.density)
+    half, full = rolled([ball(0)], strength=0.5)[0], rolled([ball(0)])[0]
+    np.testing.assert_allclose(half.colour, 0.5 + 0.5 * full.colour, rtol=1e-6)
+
+
+def test_smoke_never_appears_where_there_was_none() -> None:
+    painting = rolled([ball(0)])[0]
+    assert not painting.density[painting.smoke.density == 0].any()
+
+
+def test_same_seed_same_painting_and_another_seed_another() -> None:
+    a, b = rolled([ball(0)]), rolled([ball(0)])
+    np.testing.assert_array_equal(a[0].colour, b[0].colour)
+    assert not np.array_equal(a[0].colour, rolled([ball(0)], seed=1)[0].colour)
+
+
+def test_frames_are_read_one_at_a_time() -> None:
+    read: list[int] = []
+
+    def frames() -> Iterator[Volume]:
+        for number in range(5):
+            read.append(number)
+            yield ball(number)
+
+    config = StylizeConfig(warmup=0, steps_per_frame=1)
+    paintings = stylize(frames(), RULE, counting_step, config, box=BOX)
+    next(paintings)
+    assert read == [0]
+
+
+def test_reading_ahead_keeps_order_reads_one_ahead_and_passes_errors_on() -> None:
+    def fail() -> int:
+        raise KeyError("frame 2")
+
+    results = read_ahead([lambda: 0, lambda: 1, fail])
+    assert next(results) == 0
+    assert next(results) == 1
+    with pytest.raises(KeyError, match="frame 2"):
+        next(results)
+    assert list(read_ahead([])) == []
+
+
+def test_options_out_of_range_are_named() -> None:
+    with pytest.raises(OptionError, match="--density-strength"):
+        StylizeConfig(density_strength=1.5)
+    with pytest.raises(OptionError, match="--steps-per-frame"):
+        dataclasses.replace(StylizeConfig(), steps_per_frame=-1)
