@@ -1,0 +1,250 @@
+"""A grid in memory: leaves of 8³ cells and tiles, to and from dense arrays."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from vnca.errors import GridError
+from vnca.io.vdb.layout import LEAF_CELLS, LEAF_EDGE, VALUE_TYPES, ValueType
+from vnca.io.vdb.metadata import Metadata
+from vnca.io.vdb.transform import Transform
+from vnca.io.vdb.tree import Tiles, Tree
+from vnca.typing import AnyArray, BoolArray, Box, Index
+
+EMPTY_BOX = Box((0, 0, 0), (0, 0, 0))
+_MOST_CELLS = 2**31  # a dense array beyond this is a corrupt box, not a wish
+
+
+class Described(Protocol):
+    """What `Grid` and `GridHeader` have in common."""
+
+    @property
+    def is_half(self) -> bool: ...  # noqa: D102
+    @property
+    def metadata(self) -> Metadata: ...  # noqa: D102
+    @property
+    def transform(self) -> Transform: ...  # noqa: D102
+
+
+@dataclass(eq=False)
+class Grid:
+    """A grid with its values.
+
+    Attributes:
+        name: Without the number that tells grids of one name apart.
+        value_type: A key of `VALUE_TYPES`: `float`, `vec3s`, …
+        transform: From index space to the world.
+        tree: Leaves, tiles and background. Values are not only finite ones: check them upstream.
+        metadata: By name. Statistics in it are those of the file it came from.
+        is_half: Whether files store floating-point values as half floats.
+    """
+
+    name: str
+    value_type: str
+    transform: Transform
+    tree: Tree
+    metadata: Metadata
+    is_half: bool = False
+
+    @property
+    def grid_class(self) -> str:
+        """`fog volume`, `level set`, `staggered` or `unknown`."""
+        return self.metadata.value("class", "unknown")
+
+    @property
+    def active_voxels(self) -> int:
+        """Active cells in leaves and tiles."""
+        tiles = self.tree.tiles
+        edges = tiles.edges[tiles.active].tolist()
+        return int(self.tree.leaf_active.sum()) + sum(edge**3 for edge in edges)
+
+    def active_box(self) -> Box:
+        """The smallest box around the active cells; empty if there are none."""
+        tree = self.tree
+        cells = tree.leaf_active.reshape(-1, LEAF_EDGE, LEAF_EDGE, LEAF_EDGE)
+        bounds = []
+        for axis in range(3):
+            others = tuple(1 + other for other in range(3) if other != axis)
+            occupied = np.logical_or.reduce(cells, axis=others)
+            first, last = occupied.argmax(axis=1), 8 - occupied[:, ::-1].argmax(axis=1)
+            origins, kept = tree.leaf_origins[:, axis].astype(np.int64), occupied.any(axis=1)
+            tiles = tree.tiles.origins[tree.tiles.active, axis].astype(np.int64)
+            low = np.concatenate([(origins + first)[kept], tiles])
+            high = np.concatenate(
+                [(origins + last)[kept], tiles + tree.tiles.edges[tree.tiles.active]]
+            )
+            if not len(low):
+                return EMPTY_BOX
+            bounds.append((int(low.min()), int(high.max())))
+        (x, u), (y, v), (z, w) = bounds
+        return Box((x, y, z), (u, v, w))
+
+    def to_dense(self, box: Box, fill: Any = None) -> tuple[AnyArray, BoolArray]:
+        """The cells of `box` as arrays.
+
+        Args:
+            box: Any box in index space; what the grid does not store there is background.
+            fill: Value given to inactive cells; by default they keep theirs, which is the
+                background almost always.
+
+        Returns:
+            Values `[x, y, z]`, or `[x, y, z, 3]` for vectors, in the grid's own type, and
+            which cells are active, `[x, y, z]`.
+
+        Raises:
+            GridError: If the box is too large for an array.
+        """
+        lower = np.array([low // LEAF_EDGE * LEAF_EDGE for low in box.lower], np.int64)
+        bricks = [
+            -(-(start + cells - int(low)) // LEAF_EDGE) if cells else 0
+            for start, cells, low in zip(box.lower, box.shape, lower, strict=True)
+        ]
+        x, y, z = (brick * LEAF_EDGE for brick in bricks)
+        if x * y * z > _MOST_CELLS:
+            raise GridError(f"grid {self.name!r}: a box of {box.shape} cells is too large")
+        components = self.tree.leaf_values.shape[2:]
+        try:
+            values = np.empty((x, y, z, *components), self.tree.leaf_values.dtype)
+            active = np.zeros((x, y, z), np.bool_)
+        except MemoryError as error:
+            raise GridError(
+                f"grid {self.name!r}: no memory for a box of {box.shape} cells"
+            ) from error
+        values[...] = self.tree.background
+        self._scatter_leaves(values, active, lower)
+        self._scatter_tiles(values, active, lower)
+        inside = tuple(
+            slice(start - int(low), start - int(low) + cells)
+            for start, cells, low in zip(box.lower, box.shape, lower, strict=True)
+        )
+        # One after the other, so that only one of them is there twice.
+        values = np.ascontiguousarray(values[inside])
+        active = np.ascontiguousarray(active[inside])
+        if fill is not None:
+            values[~active] = fill
+        return values, active
+
+    def _scatter_leaves(self, values: AnyArray, active: BoolArray, lower: AnyArray) -> None:
+        """Write leaves into arrays whose first cell, `lower`, is aligned to leaves."""
+        bricks = (self.tree.leaf_origins - lower) // LEAF_EDGE
+        counts = np.array(active.shape) // LEAF_EDGE
+        inside = ((bricks >= 0) & (bricks < counts)).all(axis=1)
+        chosen = slice(None) if inside.all() else inside
+        i, j, k = bricks[chosen].T
+        for dense, leaves in ((values, self.tree.leaf_values), (active, self.tree.leaf_active)):
+            cells = leaves[chosen]
+            as_bricks(dense)[i, j, k] = cells.reshape(
+                len(cells), LEAF_EDGE, LEAF_EDGE, LEAF_EDGE, *cells.shape[2:]
+            )
+
+    def _scatter_tiles(self, values: AnyArray, active: BoolArray, lower: AnyArray) -> None:
+        tiles = self.tree.tiles
+        starts = tiles.origins - lower
+        stops = np.minimum(starts + tiles.edges[:, None].astype(np.int64), active.shape)
+        starts = np.maximum(starts, 0)
+        for tile in np.flatnonzero((starts < stops).all(axis=1)):
+            region = tuple(slice(*ends) for ends in zip(starts[tile], stops[tile], strict=True))
+            values[region] = tiles.values[tile]
+            active[region] = tiles.active[tile]
+
+    @classmethod
+    def from_dense(
+        cls,
+        name: str,
+        values: AnyArray,
+        active: BoolArray,
+        origin: Index,
+        *,
+        like: Described | None = None,
+        transform: Transform | None = None,
+        metadata: Mapping[str, Any] | None = None,
+        background: Any = 0,
+        half: bool | None = None,
+        grid_class: str | None = None,
+    ) -> "Grid":
+        """A grid with a leaf wherever cells are active.
+
+        Args:
+            name: Name of the new grid.
+            values: `[x, y, z]`, or `[x, y, z, 3]` for vectors, of a type in `VALUE_TYPES`.
+            active: `[x, y, z]`. Inactive cells become background.
+            origin: Index coordinates of cell `[0, 0, 0]`.
+            like: Gives transform, metadata and half floats where they are not given here.
+            transform: From index space to the world.
+            metadata: Entries or Python values, added to those of `like`.
+            background: Value outside.
+            half: Whether files store the values as half floats.
+            grid_class: Otherwise that of the metadata.
+
+        Raises:
+            GridError: If shapes or type do not fit, or there is no transform.
+        """
+        value_type = _value_type_of(name, values, active)
+        if any(
+            abs(start) + cells > 2**31 for start, cells in zip(origin, active.shape, strict=True)
+        ):
+            raise GridError(f"grid {name!r}: cells from {origin} leave the range of 32-bit indices")
+        if transform is None:
+            if like is None:
+                raise GridError(f"grid {name!r}: needs a transform, or a grid to be like")
+            transform = like.transform
+        entries = like.metadata.without_statistics() if like is not None else Metadata()
+        entries.update(Metadata.of(metadata))
+        if grid_class is not None:
+            entries.update(Metadata.of({"class": grid_class}))
+        if half is None:
+            half = like.is_half if like is not None else False
+        background = np.array(
+            np.broadcast_to(np.asarray(background, values.dtype), values.shape[3:])
+        )
+        tree = _cut_into_leaves(values, active, origin, background, value_type)
+        return cls(name, value_type.name, transform, tree, entries, half)
+
+
+def as_bricks(dense: AnyArray) -> AnyArray:
+    """A view `[brick x, y, z, cell x, y, z, …]` of an array aligned to leaves."""
+    x, y, z = (cells // LEAF_EDGE for cells in dense.shape[:3])
+    split = dense.reshape(x, LEAF_EDGE, y, LEAF_EDGE, z, LEAF_EDGE, *dense.shape[3:])
+    return split.transpose(0, 2, 4, 1, 3, 5, *range(6, split.ndim))
+
+
+def _value_type_of(name: str, values: AnyArray, active: BoolArray) -> ValueType:
+    if active.dtype != np.bool_ or active.ndim != 3 or values.shape[:3] != active.shape:
+        raise GridError(
+            f"grid {name!r}: values {values.shape} need a boolean mask of their cells, "
+            f"got {active.dtype} {active.shape}"
+        )
+    components = {(): 1, (3,): 3}.get(values.shape[3:])
+    for value_type in VALUE_TYPES.values():
+        if value_type.dtype == values.dtype and value_type.components == components:
+            return value_type
+    raise GridError(
+        f"grid {name!r}: no grid type for {values.dtype} values of shape {values.shape[3:]}; "
+        f"there are {', '.join(VALUE_TYPES)}"
+    )
+
+
+def _cut_into_leaves(
+    values: AnyArray, active: BoolArray, origin: Index, background: AnyArray, value_type: ValueType
+) -> Tree:
+    before = [start % LEAF_EDGE for start in origin]
+    padding = [
+        (gap, -(gap + cells) % LEAF_EDGE) for gap, cells in zip(before, active.shape, strict=True)
+    ]
+    if any(map(any, padding)):
+        values = np.pad(values, padding + [(0, 0)] * (values.ndim - 3))
+        active = np.pad(active, padding)
+    # Eight booleans along z are one integer: much the fastest way to see who is all zero.
+    columns = np.ascontiguousarray(active).view(np.uint64)
+    x, y, z = (cells // LEAF_EDGE for cells in active.shape)
+    occupied = columns.reshape(x, LEAF_EDGE, y, LEAF_EDGE, z).any(axis=(1, 3))
+    bricks = np.argwhere(occupied)
+    i, j, k = bricks.T
+    leaf_active = as_bricks(active)[i, j, k].reshape(-1, LEAF_CELLS)
+    leaf_values = as_bricks(values)[i, j, k].reshape(-1, LEAF_CELLS, *values.shape[3:])
+    leaf_values[~leaf_active] = background
+    lower = np.array([start - gap for start, gap in zip(origin, before, strict=True)], np.int64)
+    origins = (bricks * LEAF_EDGE + lower).astype(np.int32)
+    return Tree(background, origins, leaf_active, leaf_values, Tiles.none(value_type))

@@ -1,0 +1,173 @@
+"""Reading the tree of a grid: its nodes from the root down, then the values of its leaves.
+
+Reference: OpenVDB `tree/Tree.h`, `tree/RootNode.h`, `tree/InternalNode.h`, `tree/LeafNode.h`,
+`tree/LeafNodeBool.h` (`readTopology`, `readBuffers`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vnca.io.vdb.compression import Codec, read_value
+from vnca.io.vdb.cursor import Cursor
+from vnca.io.vdb.layout import (
+    LEAF_CELLS,
+    LEAF_EDGE,
+    LOWER_EDGE,
+    LOWER_SLOTS,
+    UPPER_EDGE,
+    UPPER_SLOTS,
+    Compression,
+    ValueType,
+    bits_of,
+    slot_origins,
+)
+from vnca.typing import AnyArray, BoolArray, IntArray
+
+
+class Tiles(NamedTuple):
+    """Cubes of one value: those that are active, or differ from the background.
+
+    Attributes:
+        origins: Lowest cell, `[n, 3]`.
+        edges: Cells along an edge: 8, 128 or 4096, `[n]`.
+        values: `[n]`, or `[n, 3]` for vectors.
+        active: `[n]`.
+    """
+
+    origins: IntArray
+    edges: IntArray
+    values: AnyArray
+    active: BoolArray
+
+    @classmethod
+    def none(cls, value_type: ValueType) -> "Tiles":
+        """No tiles."""
+        values = value_type.shaped(np.empty((0, value_type.components), value_type.dtype))
+        origins, edges = np.empty((0, 3), np.int32), np.empty(0, np.int32)
+        return cls(origins, edges, values, np.empty(0, np.bool_))
+
+
+class Tree(NamedTuple):
+    """What a grid stores.
+
+    Attributes:
+        background: Value everywhere else, a scalar array or `[3]`.
+        leaf_origins: Lowest cell of each leaf, `[n, 3]`.
+        leaf_active: `[n, 512]`, z fastest.
+        leaf_values: `[n, 512]`, or `[n, 512, 3]` for vectors.
+        tiles: Cubes of one value.
+    """
+
+    background: AnyArray
+    leaf_origins: IntArray
+    leaf_active: BoolArray
+    leaf_values: AnyArray
+    tiles: Tiles
+
+
+class _Topology:
+    """Walks the nodes above the leaves and gathers leaves and tiles in the file's order."""
+
+    def __init__(self, cursor: Cursor, codec: Codec) -> None:
+        self.cursor = cursor
+        self.codec = codec
+        self.leaf_origins: list[IntArray] = [np.empty((0, 3), np.int32)]
+        self.leaf_masks: list[bytes] = []
+        self.tiles: list[Tiles] = [Tiles.none(codec.value_type)]
+
+    def read_root(self) -> None:
+        cursor, value_type = self.cursor, self.codec.value_type
+        tile_count, child_count = cursor.unpack("II")
+        stored = value_type.stored_dtype(False)
+        record = np.dtype(
+            [("origin", "<i4", 3), ("value", stored, (value_type.components,)), ("active", "u1")]
+        )
+        tiles = np.frombuffer(cursor.take(tile_count * record.itemsize), record)
+        self._check_root_origins(tiles["origin"])
+        values, active = tiles["value"].astype(value_type.dtype), tiles["active"] != 0
+        self._keep_tiles(tiles["origin"], UPPER_EDGE, values, active)
+        seen = {tuple(origin) for origin in tiles["origin"].tolist()}
+        for _ in range(child_count):
+            origin = np.array(cursor.unpack("3i"), np.int32)
+            self._check_root_origins(origin[None])
+            if (key := tuple(origin.tolist())) in seen:
+                raise cursor.error(f"corrupt: two nodes at {key}")
+            seen.add(key)
+            for lower_origin in self._read_node(origin, UPPER_SLOTS, LOWER_EDGE):
+                leaf_origins = self._read_node(lower_origin, LOWER_SLOTS, LEAF_EDGE)
+                self.leaf_origins.append(leaf_origins)
+                self.leaf_masks.append(cursor.take(len(leaf_origins) * LEAF_CELLS // 8))
+
+    def _check_root_origins(self, origins: AnyArray) -> None:
+        if (origins % UPPER_EDGE).any():
+            raise self.cursor.error("corrupt: a node below the root is not on a multiple of 4096")
+
+    def _read_node(self, origin: IntArray, slots: int, slot_edge: int) -> IntArray:
+        """Keep the tiles of the internal node at the cursor; return where its children are."""
+        has_child = bits_of(self.cursor.take(slots // 8))
+        active = bits_of(self.cursor.take(slots // 8))
+        values = self.codec.read_values(self.cursor, active[None], is_leaf=False)[0]
+        per_edge = round(slots ** (1 / 3))
+        tiles = np.flatnonzero(~has_child)
+        tile_origins = origin + slot_origins(tiles, per_edge, slot_edge)
+        self._keep_tiles(tile_origins, slot_edge, values[tiles], active[tiles])
+        return origin + slot_origins(np.flatnonzero(has_child), per_edge, slot_edge)
+
+    def _keep_tiles(
+        self, origins: AnyArray, edge: int, values: AnyArray, active: BoolArray
+    ) -> None:
+        kept = active | (values != self.codec.background).any(axis=-1)
+        edges = np.full(int(kept.sum()), edge, np.int32)
+        values = self.codec.value_type.shaped(values[kept])
+        self.tiles.append(Tiles(origins[kept], edges, values, active[kept]))
+
+
+def read_tree(
+    cursor: Cursor, blocks: int, value_type: ValueType, *, is_half: bool, flags: Compression
+) -> Tree:
+    """The tree at the cursor, which must end where the cursor's range does.
+
+    Args:
+        cursor: At the first byte of the tree.
+        blocks: Where the values of the leaves begin, as the grid's descriptor says.
+        value_type: Type of the values.
+        is_half: Whether floating-point values are stored as half floats.
+        flags: How values are packed.
+
+    Raises:
+        FileFormatError: If the tree is truncated or corrupt.
+    """
+    if (buffers := cursor.unpack("i")) != 1:
+        raise cursor.error(f"corrupt: a tree of {buffers} buffers, expected 1")
+    codec = Codec(value_type, is_half, flags, read_value(cursor, value_type))
+    topology = _Topology(cursor, codec)
+    topology.read_root()
+    if cursor.position != blocks:
+        raise cursor.error(f"corrupt: the tree's values should begin at byte {blocks}")
+    origins = np.concatenate(topology.leaf_origins)
+    active = bits_of(b"".join(topology.leaf_masks)).reshape(-1, LEAF_CELLS)
+    if value_type.name == "bool":
+        values = _read_bool_leaves(cursor, origins, active)
+    else:
+        values = codec.read_values(cursor, active, is_leaf=True)
+    if cursor.remaining:
+        raise cursor.error(f"corrupt: {cursor.remaining} bytes follow the last leaf")
+    tiles = Tiles(*(np.concatenate(parts) for parts in zip(*topology.tiles, strict=True)))
+    return Tree(
+        value_type.shaped(codec.background), origins, active, value_type.shaped(values), tiles
+    )
+
+
+BOOL_LEAF = np.dtype(
+    [("active", "u1", LEAF_CELLS // 8), ("origin", "<i4", 3), ("values", "u1", LEAF_CELLS // 8)]
+)
+
+
+def _read_bool_leaves(cursor: Cursor, origins: IntArray, active: BoolArray) -> BoolArray:
+    """Values of boolean leaves, which are never packed. Reference: `tree/LeafNodeBool.h`."""
+    leaves = np.frombuffer(cursor.take(len(origins) * BOOL_LEAF.itemsize), BOOL_LEAF)
+    masks = np.packbits(active, axis=1, bitorder="little")
+    if not (np.array_equal(leaves["active"], masks) and np.array_equal(leaves["origin"], origins)):
+        raise cursor.error("corrupt: the two masks or origins of a leaf differ")
+    return np.unpackbits(leaves["values"], axis=1, bitorder="little").view(np.bool_)[..., None]
