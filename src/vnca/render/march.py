@@ -10,8 +10,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-# Candidate samples looked at together: bounds the memory of large pictures.
-SAMPLES_AT_ONCE = 1 << 23
+# Candidate samples looked at together. It bounds the memory of large pictures, and a few tens of
+# megabytes are reused from the allocator where hundreds are mapped and cleared each time anew.
+SAMPLES_AT_ONCE = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
