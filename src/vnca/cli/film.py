@@ -50,7 +50,13 @@ class Film:
     """A film of smoke, seen by a camera framed on a whole sequence."""
 
     def __init__(
-        self, path: Path, config: FilmConfig, box: Box, *, frames: int, device: torch.device
+        self,
+        path: Path,
+        config: FilmConfig,
+        box: Box,
+        *,
+        frames: int,
+        device: torch.device | str = "cpu",
     ) -> None:
         """Open the film; it appears under its name when the context ends well.
 
@@ -79,10 +85,8 @@ class Film:
         """Finish the film, or drop it if something failed."""
         self._writer.__exit__(kind, error, trace)
 
-    def add(
-        self, density: FloatArray, colour: FloatArray, origin: Index, *, gamma: float
-    ) -> FloatArray:
-        """Render the next frame, add it and return it, linear RGB `[rows, columns, 3]`.
+    def add(self, density: FloatArray, colour: FloatArray, origin: Index, *, gamma: float) -> None:
+        """Render the next frame and add it.
 
         Args:
             density: `[x, y, z]`.
@@ -100,10 +104,8 @@ class Film:
             turned=self._config.turn * self._shown / self._frames,
             device=self._device,
         )
-        frame = view.over(parse_colour(self._config.background)).clamp(0, 1).cpu().numpy()
-        self._writer.add(frame)
+        self._writer.add(view.over(parse_colour(self._config.background)).cpu().numpy())
         self._shown += 1
-        return frame
 
 
 def picture(
@@ -115,7 +117,7 @@ def picture(
     box: Box,
     gamma: float,
     turned: float,
-    device: torch.device,
+    device: torch.device | str = "cpu",
 ) -> View:
     """The view of one frame by a camera framed on `box` that has turned by some degrees."""
     lower = (np.asarray(box.lower) - origin - 0.5).tolist()

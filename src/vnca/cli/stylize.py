@@ -1,12 +1,11 @@
 """`vnca stylize MODEL SEQUENCE --out DIR`."""
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -14,14 +13,12 @@ from vnca.automaton.model import Model
 from vnca.cli.film import Film, FilmConfig
 from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
-from vnca.errors import OptionError, SequenceError
-from vnca.io.sequence import Frames, find_frames
-from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_painted
+from vnca.cli.sequence import open_sequence, sequence_box, volumes
+from vnca.errors import OptionError
+from vnca.io.smoke import SmokeFormat, write_painted
 from vnca.kernels.update import stepper
-from vnca.stylize.ahead import read_ahead
 from vnca.stylize.config import StylizeConfig
-from vnca.stylize.roll import Painting, stylize
-from vnca.typing import Box
+from vnca.stylize.roll import stylize
 
 
 @dataclass(frozen=True)
@@ -30,7 +27,7 @@ class Stylize:
 
     model: tyro.conf.Positional[Path]
     """A model file, or the folder of a training run."""
-    sequence: tyro.conf.Positional[Path]
+    sequence: tyro.conf.Positional[str]
     """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
     out: Path
     """Folder for the painted frames, which keep their names."""
@@ -44,8 +41,8 @@ class Stylize:
     """Extinction of density 1 in the preview, per cell: brightness without training again."""
     density_scale: float | None = None
     """Density that counts as 1; that of the training frame unless given."""
-    backend: str = "auto"
-    """What computes the automaton: auto, native or reference."""
+    backend: Literal["auto", "native", "reference"] = "auto"
+    """What computes the automaton."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: Annotated[StylizeConfig, tyro.conf.arg(name="")] = field(default_factory=StylizeConfig)
@@ -74,12 +71,6 @@ def paint(options: Stylize) -> None:
         VncaError: If an input cannot be used or the output cannot be written.
     """
     model = Model.load(options.model)
-    frames = find_frames(options.sequence, options.frames)
-    for path in frames.paths:
-        if path.resolve().parent == options.out.resolve():
-            raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
-    if frames.gaps:
-        say(f"{options.sequence}: frames missing: {', '.join(map(str, frames.gaps))}")
     scales = model.rule.scales
     scales = dataclasses.replace(
         scales,
@@ -87,21 +78,38 @@ def paint(options: Stylize) -> None:
         gamma=options.gamma or scales.gamma,
     )
     rule = dataclasses.replace(model.rule, scales=scales)
-    box = sequence_box(frames, options.smoke)
-    loads = [
-        partial(read_smoke, path, options.smoke, frame=number)
-        for number, path in zip(frames.numbers, frames.paths, strict=True)
-    ]
-    step = stepper(rule, options.backend)
-    paintings = stylize(read_ahead(loads), rule, step, options.config, box=box)
+    sequence = open_sequence(options.sequence, options.frames)
+    if any(f.path.resolve().parent == options.out.resolve() for f in sequence):
+        raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
+    box = sequence_box(sequence, options.smoke)
+    paintings = stylize(
+        volumes(sequence, options.smoke),
+        rule,
+        stepper(rule, options.backend),
+        options.config,
+        box=box,
+    )
     with ExitStack() as stack:
         film = None
         if options.preview is not None:
-            film = stack.enter_context(Film(options.preview, options.film, box, scales))
-        for painting, path in zip(
-            tracked(paintings, "painting", len(loads), "frames"), frames.paths, strict=True
+            film = stack.enter_context(
+                Film(options.preview, options.film, box, frames=len(sequence))
+            )
+        for painting, frame in zip(
+            tracked(paintings, "painting", len(sequence), "frames"), sequence, strict=True
         ):
-            write(painting, path, options)
+            write_painted(
+                options.out / f"{frame.path.stem}.vdb",
+                frame.path,
+                options.smoke,
+                density=painting.density,
+                colour=painting.colour,
+                box=painting.smoke.box,
+                colour_grids=options.colour_grid,
+            )
             if film is not None:
-                film.add(painting)
-    say(f"painted: {options.out}" + (f", film: {options.preview}" if options.preview else ""))
+                gamma = scales.gamma / scales.density
+                film.add(painting.density, painting.colour, painting.smoke.origin, gamma=gamma)
+    say(f"painted: {options.out}")
+    if options.preview:
+        say(f"film: {options.preview}")
