@@ -1,0 +1,87 @@
+"""`vnca info PATH`."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tyro
+
+from vnca.automaton.model import MODEL_NAME, Model
+from vnca.cli.options import parse
+from vnca.errors import FileFormatError
+from vnca.files import existing_file
+from vnca.io.vdb import GridHeader, open_vdb
+
+
+@dataclass(frozen=True)
+class Info:
+    """Describe an OpenVDB file, a model or a training run."""
+
+    path: tyro.conf.Positional[Path]
+    """A .vdb file, a .safetensors model, or the folder of a run."""
+
+
+def run(arguments: Sequence[str]) -> None:
+    """Read the options and describe."""
+    print("\n".join(describe(parse("info", Info, arguments).path)))
+
+
+def describe(path: Path) -> list[str]:
+    """Lines about a file or a run folder.
+
+    Raises:
+        VncaError: If it is missing, damaged, or nothing vnca knows.
+    """
+    if path.is_dir():
+        if not (path / MODEL_NAME).exists():
+            raise FileFormatError(f"{path}: this folder holds no {MODEL_NAME}")
+        return describe_model(path)
+    existing_file(path)
+    if path.suffix.lower() == ".vdb":
+        return describe_vdb(path)
+    if path.suffix.lower() == ".safetensors":
+        return describe_model(path)
+    raise FileFormatError(f"{path}: expected a .vdb file, a .safetensors model or a run folder")
+
+
+def describe_model(path: Path) -> list[str]:
+    """Lines about a model: its shape, its normalisers and where it comes from."""
+    model = Model.load(path)
+    config, scales = model.rule.config, model.rule.scales
+    switched_off = [
+        name for name in ("position", "density", "velocity") if not getattr(config, f"{name}_prior")
+    ]
+    return [
+        f"model of vnca {model.version}: {model.rule.weight_count} weights",
+        f"  rule        {config.channels} channels, {config.hidden} hidden, "
+        f"update probability {config.update_probability:g}",
+        f"  priors off  {', '.join(switched_off) or 'none'}",
+        f"  scales      density {scales.density:.4g}, velocity {scales.velocity:.4g} cells/frame, "
+        f"gamma {scales.gamma:.4g} per cell",
+        *(f"  {name:11} {json.dumps(value)}" for name, value in model.training.items()),
+    ]
+
+
+def describe_vdb(path: Path) -> list[str]:
+    """Lines about a VDB file: one a grid, then the metadata of the file."""
+    with open_vdb(path) as file:
+        lines = [f"OpenVDB file, {len(file.grids)} grids"]
+        for header in file.grids.values():
+            lines += _describe_grid(header)
+        lines += [f"  {name} = {value}" for name, value in file.metadata.items()]
+    return lines
+
+
+def _describe_grid(header: GridHeader) -> list[str]:
+    box = header.box
+    extent = "box not in the header"
+    if box is not None:
+        extent = "empty" if box.is_empty else f"{box.lower} to {box.upper}"
+    columns = np.asarray(header.transform.index_to_world)[:3, :3]
+    sizes = ", ".join(f"{size:.6g}" for size in np.linalg.norm(columns, axis=0))
+    half = " saved as half" if header.is_half else ""
+    return [
+        f"  {header.name}: {header.value_type}{half}, {header.grid_class}, {extent}, voxel {sizes}"
+    ]

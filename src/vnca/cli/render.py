@@ -1,0 +1,162 @@
+"""`vnca render SEQUENCE --out FILM`."""
+
+import dataclasses
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+
+from vnca.cli.film import Film, FilmConfig, parse_colour, picture
+from vnca.cli.options import parse, say
+from vnca.cli.progress import tracked
+from vnca.cli.sequence import open_sequence, sequence_box, volumes
+from vnca.errors import OptionError
+from vnca.io.image import write_image
+from vnca.io.sequence import FrameSequence
+from vnca.io.sheet import contact_sheet
+from vnca.io.smoke import SmokeFormat, read_colour
+from vnca.io.video import SUFFIXES as FILMS
+from vnca.render.brightness import gamma_for_opacity
+from vnca.typing import Box, FloatArray
+from vnca.volume import Volume
+
+OPACITY = 0.97
+"""Opacity that γ is chosen for where none is given."""
+
+
+@dataclass(frozen=True)
+class Render:
+    """Make a film or a turntable of a sequence, painted or not, or a picture of each frame."""
+
+    sequence: tyro.conf.Positional[str]
+    """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
+    out: Path
+    """A film (mp4, gif, webp), or a picture (png, exr); with #### in its name, one a frame."""
+    frames: str | None = None
+    """Frames to show, such as 30-53 or 1,4,7-9; all unless given."""
+    colour_grid: str = "Cd"
+    """Grid of linear colours; smoke without it is white."""
+    gamma: float | None = None
+    """Extinction of density 1, per cell; chosen from the first frame unless given."""
+    turntable: int = 0
+    """Hold each frame for so many pictures while the camera goes once around the smoke."""
+    strip: int = 0
+    """Put so many frames, evenly spaced, side by side into one picture."""
+    transparent: bool = False
+    """Leave the background out of pictures (png, exr)."""
+    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
+    """How smoke is read from files."""
+    film: FilmConfig = field(default_factory=FilmConfig)
+    """The camera."""
+
+    def __post_init__(self) -> None:
+        if self.gamma is not None and self.gamma <= 0:
+            raise OptionError(f"--gamma {self.gamma}: must be positive")
+        if self.turntable < 0:
+            raise OptionError(f"--turntable {self.turntable}: must not be negative")
+        if self.transparent and self.is_film:
+            raise OptionError("--transparent: films have no transparency; write .png or .exr")
+        if self.strip < 0 or (self.strip and self.is_film):
+            raise OptionError(f"--strip {self.strip}: a number of frames, with a picture as --out")
+        if self.turntable and not self.is_film:
+            raise OptionError("--turntable: needs a film (mp4, gif, webp) as --out")
+
+    @property
+    def is_film(self) -> bool:
+        """Whether the output is a film rather than pictures."""
+        return self.out.suffix.lower() in FILMS
+
+
+def run(arguments: Sequence[str]) -> None:
+    """Read the options and render."""
+    render_sequence(parse("render", Render, arguments))
+
+
+def render_sequence(options: Render) -> None:
+    """Render as asked.
+
+    Raises:
+        VncaError: If an input cannot be used or the output cannot be written.
+    """
+    sequence = open_sequence(options.sequence, options.frames)
+    if options.strip:
+        write_image(options.out, contact_sheet([strip(sequence, options, options.strip)]))
+        say(f"rendered: {options.out}")
+        return
+    if not options.is_film and len(sequence) > 1 and "#" not in options.out.name:
+        raise OptionError(
+            f"--out {options.out}: {len(sequence)} frames need a film (mp4, gif, webp), "
+            "a name such as frame_####.png, or --frames"
+        )
+    box = sequence_box(sequence, options.smoke)
+    shown = tracked(_frames(sequence, options), "rendering", len(sequence), "frames")
+    if options.is_film:
+        _film(shown, len(sequence), box, options)
+    else:
+        _pictures(shown, box, options)
+    say(f"rendered: {options.out}")
+
+
+def strip(sequence: FrameSequence, options: Render, count: int) -> list[FloatArray]:
+    """Pictures, linear RGB `[rows, columns, 3]`, of `count` frames evenly spaced in a sequence."""
+    picked = sorted({round(at) for at in np.linspace(0, len(sequence) - 1, count)})
+    some = FrameSequence(tuple(sequence[at] for at in picked))
+    box = sequence_box(sequence, options.smoke)
+    return [_picture(frame, box, options) for frame in _frames(some, options)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """A frame with what it takes to draw it."""
+
+    smoke: Volume
+    colour: FloatArray
+    gamma: float
+
+
+def _frames(sequence: FrameSequence, options: Render) -> Iterator[_Shown]:
+    gamma = options.gamma
+    for frame, smoke in zip(sequence, volumes(sequence, options.smoke), strict=True):
+        if gamma is None and smoke.density.size:
+            gamma = gamma_for_opacity(smoke.density, OPACITY)
+        colour = read_colour(frame.path, options.smoke, grid=options.colour_grid, box=smoke.box)
+        if colour is None:
+            colour = np.ones((*smoke.density.shape, 3), dtype=np.float32)
+        yield _Shown(smoke, colour, gamma or 1.0)
+
+
+def _film(shown: Iterator[_Shown], frames: int, box: Box, options: Render) -> None:
+    repeats = options.turntable or 1
+    config = dataclasses.replace(options.film, turn=360.0) if options.turntable else options.film
+    with Film(options.out, config, box, frames=frames * repeats) as film:
+        for frame in shown:
+            for _ in range(repeats):
+                film.add(frame.smoke.density, frame.colour, frame.smoke.origin, gamma=frame.gamma)
+
+
+def _pictures(shown: Iterator[_Shown], box: Box, options: Render) -> None:
+    for frame in shown:
+        write_image(_numbered(options.out, frame.smoke.frame), _picture(frame, box, options))
+
+
+def _picture(frame: _Shown, box: Box, options: Render) -> FloatArray:
+    view = picture(
+        frame.smoke.density,
+        frame.colour,
+        frame.smoke.origin,
+        options.film,
+        box=box,
+        gamma=frame.gamma,
+        turned=0.0,
+    )
+    image = view.rgba if options.transparent else view.over(parse_colour(options.film.background))
+    return image.cpu().numpy()
+
+
+def _numbered(path: Path, frame: int) -> Path:
+    """The path with its #### replaced by a frame number of as many digits."""
+    return path.with_name(re.sub("#+", lambda run: f"{frame:0{len(run[0])}d}", path.name))

@@ -1,0 +1,44 @@
+"""A sequence of smoke as the subcommands see it: frames, gaps told, box, volumes read ahead."""
+
+from collections.abc import Iterator
+from functools import partial
+
+from vnca.cli.options import say
+from vnca.errors import SequenceError
+from vnca.io.sequence import FrameSequence, find_frames, format_frames
+from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box
+from vnca.stylize.ahead import read_ahead
+from vnca.typing import Box
+from vnca.volume import Volume
+
+
+def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
+    """The frames of a pattern; gaps are told on standard error.
+
+    Raises:
+        SequenceError: If there are none.
+    """
+    sequence = find_frames(pattern, frames)
+    if sequence.gaps:
+        say(f"{pattern}: no file for frames {format_frames(sequence.gaps)}; going on without")
+    return sequence
+
+
+def sequence_box(sequence: FrameSequence, smoke: SmokeFormat) -> Box:
+    """The box that holds the smoke of all frames, from the files' headers where they tell.
+
+    Raises:
+        SequenceError: If no frame has smoke.
+    """
+    box = Box((0, 0, 0), (0, 0, 0))
+    for frame in sequence:
+        box = box.union(smoke_box(frame.path, smoke))
+    if box.is_empty:
+        raise SequenceError(f"{sequence[0].path.parent}: there is no smoke in any frame")
+    return box
+
+
+def volumes(sequence: FrameSequence, smoke: SmokeFormat) -> Iterator[Volume]:
+    """The frames in order, the next one read while one is used."""
+    loads = (partial(read_smoke, f.path, smoke, frame=f.number) for f in sequence)
+    return read_ahead(loads)
