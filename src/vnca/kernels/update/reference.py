@@ -36,7 +36,7 @@ def perceive(neighbourhood: Tensor, stencil: Tensor) -> Tensor:
     Reference: VNCA, equation for z_ijk.
     """
     _, cells, channels = neighbourhood.shape
-    filtered = (stencil @ neighbourhood.flatten(1)).view(-1, cells, channels)
+    filtered = (stencil @ neighbourhood.flatten(1)).view(len(stencil), cells, channels)
     return filtered.transpose(0, 1).flatten(1)
 
 
@@ -125,4 +125,4 @@ class _Update(torch.autograd.Function):
 def _gather(state: Tensor, neighbours: Tensor, rows: Tensor) -> Tensor:
     """States `[27, cells, C]` around the cells in `rows`."""
     around = neighbours.index_select(1, rows)
-    return state.index_select(0, around.flatten()).view(*around.shape, -1)
+    return state.index_select(0, around.flatten()).view(*around.shape, state.shape[1])

@@ -1,0 +1,212 @@
+// The Python side of the native step: checks every array, then works without the interpreter.
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cmath>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "step.hpp"
+
+namespace nb = nanobind;
+using namespace vnca;
+
+namespace {
+
+using Input = nb::ndarray<nb::ro>;
+using Output = nb::ndarray<>;
+
+constexpr std::int64_t MOST_CHANNELS = 64, MOST_HIDDEN = 512, MOST_PRIORS = 16;
+constexpr std::int64_t ANY = -1;
+
+template <class T>
+constexpr const char* NAME = "float32";
+template <>
+inline constexpr const char* NAME<std::int32_t> = "int32";
+
+std::string text(const std::vector<std::int64_t>& shape) {
+    std::string result = "[";
+    for (const std::int64_t length : shape)
+        result += (result.size() > 1 ? ", " : "") + (length == ANY ? "any" : std::to_string(length));
+    return result + "]";
+}
+
+// The data of an array that must be of type T, of the given shape, contiguous and in main memory.
+template <class T, class Array>
+auto* data_of(const Array& array, const char* name, const std::vector<std::int64_t>& shape) {
+    std::vector<std::int64_t> actual;
+    for (std::size_t axis = 0; axis < array.ndim(); ++axis) actual.push_back(array.shape(axis));
+    bool fits = actual.size() == shape.size();
+    for (std::size_t axis = 0; fits && axis < shape.size(); ++axis)
+        fits = shape[axis] == ANY || shape[axis] == actual[axis];
+    if (!fits)
+        throw nb::value_error(
+            (std::string(name) + ": expected shape " + text(shape) + ", got " + text(actual)).c_str());
+    if (array.dtype() != nb::dtype<T>())
+        throw nb::value_error((std::string(name) + ": expected " + NAME<T>).c_str());
+    std::int64_t stride = 1;
+    bool contiguous = array.device_type() == nb::device::cpu::value;
+    for (std::size_t axis = actual.size(); axis-- > 0; stride *= actual[axis])
+        contiguous = contiguous && (actual[axis] < 2 || array.stride(axis) == stride);
+    if (!contiguous && array.size() > 0)
+        throw nb::value_error((std::string(name) + ": expected a contiguous array in main memory").c_str());
+    if constexpr (std::is_same_v<Array, Input>) return static_cast<const T*>(array.data());
+    else return static_cast<T*>(array.data());
+}
+
+// Lengths of a step, from the arrays that define them; an array of another rank gives zeros,
+// which `data_of` then reports.
+std::int64_t length(const Input& array, std::size_t axis) {
+    return axis < array.ndim() ? std::int64_t(array.shape(axis)) : 0;
+}
+
+// Each filter's scale over its integer form.
+void read_scales(const float* stencil, float* scale) {
+    static constexpr int SMOOTH[3] = {1, 2, 1}, LAPLACIAN[4] = {-88, 6, 3, 2};
+    static constexpr int SAMPLE[FILTERS] = {13, 22, 16, 14, 14};  // a weight that is not zero
+    for (int filter = 0; filter < FILTERS; ++filter) {
+        float form[NEIGHBOURS];
+        for (int o = 0; o < NEIGHBOURS; ++o) {
+            const int x = o / 9 - 1, y = o / 3 % 3 - 1, z = o % 3 - 1;
+            const int sobel[3] = {x * SMOOTH[y + 1] * SMOOTH[z + 1],
+                                  y * SMOOTH[x + 1] * SMOOTH[z + 1],
+                                  z * SMOOTH[x + 1] * SMOOTH[y + 1]};
+            const int distance = std::abs(x) + std::abs(y) + std::abs(z);
+            form[o] = float(filter == 0   ? distance == 0
+                            : filter == 4 ? LAPLACIAN[distance]
+                                          : sobel[filter - 1]);
+        }
+        const float* const weights = stencil + filter * NEIGHBOURS;
+        scale[filter] = weights[SAMPLE[filter]] / form[SAMPLE[filter]];
+        for (int o = 0; o < NEIGHBOURS; ++o)
+            if (!(std::abs(weights[o] - scale[filter] * form[o]) <=
+                  1e-6f * std::abs(scale[filter] * form[o])))
+                throw nb::value_error(
+                    "stencil: the native kernel knows only multiples of the identity, the three "
+                    "Sobel filters and the 27-point Laplacian");
+    }
+}
+
+// The arrays of a step, checked but for the range of the neighbours.
+struct Arrays {
+    Step step;
+    Rows rows;
+
+    Arrays(const Input& state, const Input& rows_array, const Input& neighbours,
+           const Input& priors, const Input& first, const Input& bias, const Input& second,
+           const Input& stencil) {
+        const std::int64_t n = length(neighbours, 1), c = length(state, 1), p = length(priors, 1),
+                           h = length(first, 0);
+        const auto in_range = [](const char* name, std::int64_t value, std::int64_t lowest,
+                                 std::int64_t highest) {
+            if (value < lowest || value > highest)
+                throw nb::value_error(("the native kernel works with " + std::to_string(lowest) +
+                                       " to " + std::to_string(highest) + " " + name + ", got " +
+                                       std::to_string(value)).c_str());
+        };
+        step.state = data_of<float>(state, "state", {n + 1, c == 0 ? ANY : c});
+        step.neighbours = data_of<std::int32_t>(neighbours, "neighbours", {NEIGHBOURS, n});
+        step.prior_values = data_of<float>(priors, "priors", {n, priors.ndim() == 2 ? p : ANY});
+        in_range("cells", n, 0, INT32_MAX - 1);
+        in_range("channels", c, 1, MOST_CHANNELS);
+        in_range("hidden units", h, 1, MOST_HIDDEN);
+        in_range("priors", p, 0, MOST_PRIORS);
+        step.first = data_of<float>(first, "hidden weights", {h, FILTERS * c + p});
+        step.bias = data_of<float>(bias, "hidden bias", {h});
+        step.second = data_of<float>(second, "output weights", {c, h});
+        read_scales(data_of<float>(stencil, "stencil", {FILTERS, NEIGHBOURS}), step.scale);
+        step.cells = n;
+        step.channels = int(c);
+        step.hidden = int(h);
+        step.priors = int(p);
+        rows = {data_of<std::int32_t>(rows_array, "rows", {ANY}), length(rows_array, 0)};
+    }
+
+    // Rows must be checked before use.
+    void check_rows() const {
+        bool ascending = true;
+        for (std::int64_t i = 1; i < rows.count; ++i)
+            ascending &= rows.data[i - 1] < rows.data[i];
+        if (!ascending) throw nb::value_error("rows: expected ascending numbers, each at most once");
+        if (rows.count > 0 && (rows.data[0] < 0 || rows.data[rows.count - 1] >= step.cells))
+            throw nb::value_error(("rows: expected numbers of cells, from 0 to " +
+                                   std::to_string(step.cells - 1)).c_str());
+    }
+
+    void check_neighbours(bool valid) const {
+        if (!valid)
+            throw nb::value_error(("neighbours: expected rows of the state, from 0 to " +
+                                   std::to_string(step.cells)).c_str());
+    }
+};
+
+void check_apart(const float* output, std::int64_t size, const float* input) {
+    if (size > 0 && output < input + size && input < output + size)
+        throw nb::value_error("the output shares memory with the input");
+}
+
+const Kernel& kernel_named(const std::string& name) {
+    for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel)
+        if (name.empty() || name == (*kernel)->name) return **kernel;
+    throw nb::value_error(("this machine does not run the native kernel for " + name).c_str());
+}
+
+}  // namespace
+
+NB_MODULE(_native, m) {
+    m.doc() = "The native step of the automaton; see native.py.";
+
+    m.def("instructions", [] {
+        std::vector<std::string> names;
+        for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel)
+            names.emplace_back((*kernel)->name);
+        return names;
+    });
+
+    m.def("forward", [](Input state, Input rows, Input neighbours, Input priors, Input first,
+                        Input bias, Input second, Input stencil, Output out, int threads,
+                        const std::string& instructions) {
+        const Arrays arrays(state, rows, neighbours, priors, first, bias, second, stencil);
+        const Step& step = arrays.step;
+        const Kernel& kernel = kernel_named(instructions);
+        float* const to = data_of<float>(out, "out", {step.cells + 1, step.channels});
+        check_apart(to, std::int64_t(out.size()), step.state);
+        bool valid;
+        {
+            nb::gil_scoped_release released;
+            arrays.check_rows();
+            valid = forward(kernel, step, arrays.rows, to, threads);
+        }
+        arrays.check_neighbours(valid);
+    });
+
+    m.def("backward", [](Input state, Input rows, Input neighbours, Input priors, Input first,
+                         Input bias, Input second, Input stencil, Input gradient,
+                         Output to_state, Output to_first, Output to_bias, Output to_second,
+                         int threads, const std::string& instructions) {
+        const Arrays arrays(state, rows, neighbours, priors, first, bias, second, stencil);
+        const Step& step = arrays.step;
+        const Kernel& kernel = kernel_named(instructions);
+        const std::vector<std::int64_t> shape = {step.cells + 1, step.channels};
+        const float* const from = data_of<float>(gradient, "gradient", shape);
+        const Gradients to = {
+            data_of<float>(to_state, "gradient of the state", shape),
+            data_of<float>(to_first, "gradient of the hidden weights", {step.hidden, step.inputs()}),
+            data_of<float>(to_bias, "gradient of the hidden bias", {step.hidden}),
+            data_of<float>(to_second, "gradient of the output weights", {step.channels, step.hidden}),
+        };
+        check_apart(to.state, std::int64_t(to_state.size()), step.state);
+        check_apart(to.state, std::int64_t(to_state.size()), from);
+        bool valid;
+        {
+            nb::gil_scoped_release released;
+            arrays.check_rows();
+            valid = backward(kernel, step, arrays.rows, from, to, threads);
+        }
+        arrays.check_neighbours(valid);
+    });
+}

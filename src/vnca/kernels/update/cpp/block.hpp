@@ -1,0 +1,67 @@
+// What the vectorised inner loops offer to the driver, whatever instructions they use.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace vnca {
+
+constexpr int NEIGHBOURS = 27;
+constexpr int FILTERS = 5;
+constexpr int BLOCK = 48;  // cells worked through at a time; a multiple of every tile's height
+
+// The arrays of one step, as the Python side hands them over: C-contiguous and checked.
+struct Step {
+    std::int64_t cells;
+    int channels, hidden, priors;
+    const float* state;              // [cells + 1, channels], the last row is the outside
+    const std::int32_t* neighbours;  // [27, cells]
+    const float* prior_values;       // [cells, priors]
+    const float* first;              // W1 [hidden, 5 channels + priors]
+    const float* bias;               // b1 [hidden]
+    const float* second;             // W2 [channels, hidden]
+    float scale[FILTERS];            // of each filter over its integer form, see `perceive`
+
+    int inputs() const { return FILTERS * channels + priors; }
+};
+
+// Cells of one block and where their neighbours are.
+struct Block {
+    int count;                                  // at most BLOCK
+    const std::int32_t* rows;                   // [count]
+    std::int32_t around[NEIGHBOURS][BLOCK];     // rows of the state, each in [0, cells]
+    std::int32_t slots[NEIGHBOURS][BLOCK];      // backward: rows of the gathered gradient
+};
+
+// How many floats the buffers of a step take, and how their rows are laid out.
+struct Sizes {
+    std::size_t packed;         // weights as the inner loops want them, shared by all threads
+    std::size_t scratch;        // one thread's working memory
+    std::size_t first_rows;     // of the gradient of [W1 | b1]ᵀ, padded
+    std::size_t second_rows;    // of the gradient of W2, padded
+    std::size_t hidden;         // padded width of both
+    std::size_t channels;       // padded width of the gradient of a cell's state
+
+    std::size_t gradient() const { return (first_rows + second_rows) * hidden; }
+};
+
+struct Kernel {
+    const char* name;
+    Sizes (*sizes)(const Step&);
+    void (*pack)(const Step&, float* packed);
+
+    // out[row] += the change of the row's cell.
+    void (*forward)(const Step&, const float* packed, const Block&, float* scratch, float* out);
+
+    // Adds to `weights` the gradients of [W1 | b1]ᵀ and W2, and to `state` (rows given by the
+    // block's slots) that of the cells' neighbourhoods.
+    void (*backward)(const Step&, const float* packed, const Block&, const float* gradient,
+                     float* scratch, float* weights, float* state);
+};
+
+// One for each instruction set that this build knows, fastest first; null if it was left out.
+namespace avx512 { extern const Kernel kernel; }
+namespace avx2 { extern const Kernel kernel; }
+namespace portable { extern const Kernel kernel; }
+
+}  // namespace vnca

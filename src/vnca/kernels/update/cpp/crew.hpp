@@ -1,0 +1,77 @@
+// A crew of threads that share the tasks of one call and sleep in between.
+#pragma once
+
+#include <sys/types.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace vnca {
+
+class Crew {
+public:
+    // The crew of this process. It is never destroyed: its threads sleep until the process ends.
+    // After a fork the child, which inherits no threads, gets a crew of its own.
+    static Crew& of_process() {
+        static std::mutex guard;
+        static Crew* crew = nullptr;
+        const std::lock_guard lock(guard);
+        if (crew == nullptr || crew->process_ != getpid()) crew = new Crew;
+        return *crew;
+    }
+
+    // Runs task(index, worker) for every index in [0, tasks), `worker` < threads telling who does
+    // it. Returns when all are done. Tasks must not throw. A second caller at the same time, and
+    // one who wants a single thread, does its tasks itself.
+    void run(int tasks, int threads, const std::function<void(int, int)>& task) {
+        const std::unique_lock turn(turn_, std::try_to_lock);
+        if (threads > tasks) threads = tasks;
+        if (threads < 2 || !turn.owns_lock()) {
+            for (int index = 0; index < tasks; ++index) task(index, 0);
+            return;
+        }
+        while (int(workers_.size()) < threads - 1) {
+            const int worker = int(workers_.size()) + 1;
+            workers_.emplace_back([this, worker, seen = round_.load()] { work(worker, seen); });
+        }
+        task_ = &task;
+        tasks_ = tasks;
+        threads_ = threads;
+        next_.store(0, std::memory_order_relaxed);
+        busy_.store(int(workers_.size()), std::memory_order_relaxed);
+        round_.fetch_add(1, std::memory_order_release);
+        round_.notify_all();
+        take_tasks(0);
+        for (int busy; (busy = busy_.load(std::memory_order_acquire)) != 0;) busy_.wait(busy);
+    }
+
+private:
+    void take_tasks(int worker) {
+        for (int index; (index = next_.fetch_add(1, std::memory_order_relaxed)) < tasks_;)
+            (*task_)(index, worker);
+    }
+
+    void work(int worker, std::uint32_t seen) {
+        for (;;) {
+            round_.wait(seen, std::memory_order_acquire);
+            seen = round_.load(std::memory_order_relaxed);  // the next begins after this one ends
+            if (worker < threads_) take_tasks(worker);
+            if (busy_.fetch_sub(1, std::memory_order_acq_rel) == 1) busy_.notify_one();
+        }
+    }
+
+    const pid_t process_ = getpid();
+    std::mutex turn_;
+    std::vector<std::thread> workers_;
+    const std::function<void(int, int)>* task_ = nullptr;
+    int tasks_ = 0, threads_ = 0;
+    std::atomic<std::uint32_t> round_ = 0;
+    std::atomic<int> next_ = 0, busy_ = 0;
+};
+
+}  // namespace vnca

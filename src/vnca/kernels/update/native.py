@@ -1,0 +1,129 @@
+"""One step of the automaton on the CPU, fused and vectorised; numpy in and out, float32.
+
+The work is done by a small C++ extension (folder `cpp`), which installation leaves out where it
+finds no compiler. It picks the widest instructions that the machine has when it is called.
+"""
+
+import os
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from vnca.errors import BackendUnavailableError, ShapeError
+from vnca.typing import FloatArray, IntArray
+
+try:
+    from vnca.kernels.update import _native
+except ImportError as error:
+    _native: Any = None
+    _reason = str(error)
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def unavailable() -> str | None:
+    """Why the native kernel cannot run here, or nothing if it can."""
+    if _native is not None:
+        return None
+    return f"its extension was not built, or does not load ({_reason}); reinstall with GCC or Clang"
+
+
+def instructions() -> list[str]:
+    """Instruction sets that the kernel can use on this machine, the one it uses by default first."""
+    return _extension().instructions()
+
+
+def default_threads() -> int:
+    """Cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def forward(
+    state: FloatArray,
+    rows: IntArray,
+    neighbours: IntArray,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    *,
+    threads: int | None = None,
+    out: FloatArray | None = None,
+    instructions: str = "",
+) -> FloatArray:
+    """The state after one step: s' = s + W2 relu(W1 [z ‖ priors] + b1) on `rows`, s elsewhere.
+
+    Bit-equal between runs and whatever the number of threads. Other Python threads run meanwhile.
+
+    Args:
+        state: `[n + 1, C]`, C at most 64; the last row is the outside, always zero.
+        rows: `[m]` cells that change in this step, ascending.
+        neighbours: `[27, n]` rows of the state around each cell; n where nothing lives.
+        priors: `[n, P]`, P at most 16.
+        hidden: W1 `[H, 5C + P]`, H at most 512.
+        bias: b1 `[H]`.
+        output: W2 `[C, H]`.
+        stencil: `[5, 27]` from `vnca.kernels.update.stencil`, with any divisors.
+        threads: How many to use; by default one for each core.
+        out: `[n + 1, C]` to write to; by default a new array.
+        instructions: One of `instructions()`; by default the first.
+
+    Returns:
+        `[n + 1, C]`.
+
+    Raises:
+        BackendUnavailableError: If the extension was not built.
+        ShapeError: If arrays are not contiguous, of other shapes or types than above, or hold
+            indices out of range.
+    """
+    if out is None:
+        out = np.empty_like(state)
+    arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, out)
+    _checked(_extension().forward, *arguments, threads or default_threads(), instructions)
+    return out
+
+
+def backward(
+    state: FloatArray,
+    rows: IntArray,
+    neighbours: IntArray,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    gradient: FloatArray,
+    *,
+    threads: int | None = None,
+    instructions: str = "",
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Gradients of the state `[n + 1, C]`, W1, b1 and W2 from the gradient of `forward`'s result.
+
+    The hidden layer is computed anew. Bit-equal between runs and whatever the number of threads.
+    The gradient of the outside is zero. Arguments and errors are those of `forward`.
+    """
+    results = tuple(np.empty_like(array) for array in (state, hidden, bias, output))
+    arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, gradient)
+    count = threads or default_threads()
+    _checked(_extension().backward, *arguments, *results, count, instructions)
+    to_state, to_hidden, to_bias, to_output = results
+    return to_state, to_hidden, to_bias, to_output
+
+
+def _extension() -> Any:
+    reason = unavailable()
+    if reason is not None:
+        raise BackendUnavailableError(f"the native kernel cannot run: {reason}")
+    return _native
+
+
+def _checked(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    try:
+        return function(*args, **kwargs)
+    except ValueError as error:
+        raise ShapeError(f"update step: {error}") from None

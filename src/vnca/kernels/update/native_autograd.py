@@ -1,0 +1,65 @@
+"""The native step in torch's automatic differentiation; float32 on the CPU."""
+
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from vnca.kernels.update import native
+from vnca.kernels.update.reference import Weights
+from vnca.typing import AnyArray
+
+
+def update(
+    state: Tensor,
+    rows: Tensor,
+    neighbours: Tensor,
+    priors: Tensor,
+    weights: Weights,
+    stencil: Tensor,
+    *,
+    threads: int | None = None,
+) -> Tensor:
+    """The state after one step, as `vnca.kernels.update.reference.update` has it.
+
+    Differentiable, once, in the state and the weights. Beyond the two states, memory is kept for
+    nothing: the backward pass computes the hidden layer anew.
+
+    Args:
+        state: `[n + 1, C]`; the last row is the outside, always zero.
+        rows: `[m]` cells that change in this step, int32, ascending.
+        neighbours: `[27, n]` rows of the state around each cell, int32; n where nothing lives.
+        priors: `[n, P]`.
+        weights: W1, b1 and W2.
+        stencil: `[5, 27]` perception filters.
+        threads: How many to use; by default one for each core.
+
+    Raises:
+        BackendUnavailableError: If the native kernel was not built.
+        ShapeError: If shapes, types or indices are not as above.
+    """
+    result = _Update.apply(state, rows, neighbours, priors, *weights, stencil, threads)
+    assert isinstance(result, Tensor)
+    return result
+
+
+class _Update(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, *inputs: Any) -> Tensor:
+        *tensors, ctx.threads = inputs
+        ctx.save_for_backward(*tensors)
+        return torch.from_numpy(native.forward(*map(_array, tensors), threads=ctx.threads))
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *grad_outputs: Tensor) -> tuple[Tensor | None, ...]:
+        arrays = map(_array, (*ctx.saved_tensors, *grad_outputs))
+        to_state, *to_weights = map(
+            torch.from_numpy, native.backward(*arrays, threads=ctx.threads)
+        )
+        return to_state, None, None, None, *to_weights, None, None
+
+
+def _array(tensor: Tensor) -> AnyArray:
+    return tensor.detach().contiguous().numpy()
