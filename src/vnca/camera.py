@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from vnca.typing import AnyArray, FloatArray
 Point = tuple[float, float, float]
 
 
+@runtime_checkable
 class Camera(Protocol):
     """What a renderer needs to know of a camera."""
 

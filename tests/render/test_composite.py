@@ -35,13 +35,13 @@ def test_weights_and_what_is_left_add_up_to_one() -> None:
 def test_nearer_smoke_hides_farther_smoke() -> None:
     extinction = torch.full((1, 2), 3.0)
     colour = torch.tensor([[[1.0, 0, 0], [0, 1.0, 0]]])
-    pixel, _ = composite(extinction, colour, step=1)
+    pixel, _ = composite(extinction, colour, step=1.0)
     near = 1 - math.exp(-3)
     assert pixel[0].tolist() == pytest.approx([near, near * math.exp(-3), 0])
 
 
 def test_thinnest_smoke_keeps_its_opacity_in_single_precision() -> None:
-    weights, _ = ray_weights(torch.full((1, 1), 1e-10), step=1)
+    weights, _ = ray_weights(torch.full((1, 1), 1e-10), step=1.0)
     assert weights.item() == pytest.approx(1e-10)
 
 
@@ -67,7 +67,7 @@ def test_paper_mode_is_the_printed_sum() -> None:
 
 
 @pytest.mark.parametrize(
-    "call", [lambda d, c: composite(d, c, step=1), lambda d, c: paper_composite(d, c, gamma=1)]
+    "call", [lambda d, c: composite(d, c, step=1.0), lambda d, c: paper_composite(d, c, gamma=1.0)]
 )
 def test_colours_for_other_samples_are_refused(call) -> None:
     density, colour = random_rays()

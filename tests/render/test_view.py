@@ -46,7 +46,7 @@ def test_a_marked_cell_appears_where_the_camera_says(angles, field_of_view) -> N
     density = torch.zeros(shape)
     density[cell] = 1
     camera = camera_on(shape, *angles, field_of_view=field_of_view)
-    view = render(density, white(density), camera, rows=64, columns=64, gamma=1, step=0.25)
+    view = render(density, white(density), camera, rows=64, columns=64, gamma=1.0, step=0.25)
     rows, columns = torch.meshgrid(torch.arange(64.0), torch.arange(64.0), indexing="ij")
     total = view.opacity.sum()
     row, column, depth = camera.project(torch.tensor(cell).numpy(), 64, 64)
@@ -62,7 +62,7 @@ def test_nearer_smoke_hides_farther_smoke_from_both_sides(azimuth, seen) -> None
     colour = torch.zeros(5, 9, 5, 3)
     density[:, :4], density[:, 5:] = 20, 20
     colour[:, :4, :, 0], colour[:, 5:, :, 1] = 1, 1
-    view = render(density, colour, camera_on((5, 9, 5), azimuth), rows=9, columns=9, gamma=1)
+    view = render(density, colour, camera_on((5, 9, 5), azimuth), rows=9, columns=9, gamma=1.0)
     expected = [0.0, 0.0, 0.0]
     expected[seen] = 1.0
     assert view.colour[4, 4].tolist() == pytest.approx(expected, abs=1e-6)
@@ -125,7 +125,7 @@ def test_gradients_are_finite_where_smoke_fades_to_nothing() -> None:
     colour = torch.rand(12, 12, 12, 3, generator=torch.Generator().manual_seed(0))
     colour.requires_grad_()
     view = render(density, colour, camera_on(density.shape, 10), rows=24, columns=24, gamma=0.5)
-    (view.over((1, 1, 1)).square().sum() + view.depth[view.depth.isfinite()].sum()).backward()
+    (view.over((1.0, 1.0, 1.0)).square().sum() + view.depth[view.depth.isfinite()].sum()).backward()
     assert density.grad is not None
     assert colour.grad is not None
     assert density.grad.isfinite().all()
@@ -193,7 +193,7 @@ def test_background_shows_through_as_much_as_the_smoke_lets_it() -> None:
 )
 def test_a_view_without_smoke_is_transparent(camera) -> None:
     density = torch.full((4, 4, 4), 0.0 if camera.target[0] == 1.5 else 1.0)
-    view = render(density, white(density), camera, rows=5, columns=6, gamma=1)
+    view = render(density, white(density), camera, rows=5, columns=6, gamma=1.0)
     assert view.rgba.shape == (5, 6, 4)
     assert view.rgba.abs().max() == 0
     assert view.depth.isinf().all()
