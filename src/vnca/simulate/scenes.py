@@ -131,7 +131,7 @@ class Scene:
 
 
 SCENES = {
-    "plume": Scene((1, 1, 1.5), Forces(buoyancy=0.008, confinement=0.1), _plume),
+    "plume": Scene((1, 1, 1.5), Forces(buoyancy=0.011, confinement=0.1), _plume),
     "jets": Scene((1.5, 1, 1), Forces(buoyancy=0.001, confinement=0.1), _jets),
     "ring": Scene((1, 1, 1.5), Forces(buoyancy=0.0003, confinement=0.05), _ring),
 }

@@ -81,10 +81,21 @@ class Smoke:
 
 def advance(smoke: Smoke, forces: Forces) -> None:
     """Carry density and velocity along with the flow for one frame, then let both fade."""
-    carrier = smoke.faces
-    centres = smoke.velocity
-    smoke.density = _carried(smoke.density, np.moveaxis(centres, -1, 0))
-    smoke.faces = [_carried(carrier[axis], _at_faces(carrier, axis)) for axis in AXES]
+    velocity = np.moveaxis(smoke.velocity, -1, 0)
+    home = _grid_of(smoke.density)
+    # Midpoint rule: in a vortex, half a turn a frame, straight steps would end outside it.
+    came, goes = (
+        [
+            _sampled(component, [x + 0.5 * sign * v for x, v in zip(home, velocity, strict=True)])
+            for component in velocity
+        ]
+        for sign in (-1, 1)
+    )
+    smoke.density = _carried(smoke.density, came, goes)
+    smoke.faces = [
+        _carried(face, _at_faces(came, axis), _at_faces(goes, axis))
+        for axis, face in enumerate(smoke.faces)
+    ]
     smoke.density *= 1 - forces.dissipation
     smoke.density -= forces.erosion
     np.maximum(smoke.density, 0, out=smoke.density)
@@ -132,11 +143,19 @@ def _eigenvalue(wave: FloatArray, cells: int) -> FloatArray:
     return 2 * np.cos(np.pi / cells * wave, dtype=np.float32) - 2
 
 
-def _carried(field: FloatArray, velocity: Sequence[FloatArray] | FloatArray) -> FloatArray:
-    """`field` after one frame of MacCormack advection; `velocity` is given where `field` is."""
-    home = np.indices(field.shape, dtype=np.float32, sparse=True)
-    source = [here - v for here, v in zip(home, velocity, strict=True)]
-    target = [here + v for here, v in zip(home, velocity, strict=True)]
+def _carried(
+    field: FloatArray, came: Sequence[FloatArray], goes: Sequence[FloatArray]
+) -> FloatArray:
+    """`field` after one frame of MacCormack advection.
+
+    Args:
+        field: At cell centres or at the faces across one axis.
+        came: For each axis, how far what arrives at each place has travelled, cells.
+        goes: How far what is there now will travel.
+    """
+    home = _grid_of(field)
+    source = [x - step for x, step in zip(home, came, strict=True)]
+    target = [x + step for x, step in zip(home, goes, strict=True)]
     moved = _sampled(field, source)
     corrected = moved.copy()
     corrected += 0.5 * (field - _sampled(moved, target))
@@ -148,6 +167,10 @@ def _carried(field: FloatArray, velocity: Sequence[FloatArray] | FloatArray) -> 
     low, high = (_corners(field, pick)[corner] for pick in (np.minimum, np.maximum))
     np.copyto(corrected, moved, where=(corrected < low) | (corrected > high))
     return corrected
+
+
+def _grid_of(field: FloatArray) -> tuple[FloatArray, ...]:
+    return np.indices(field.shape, dtype=np.float32, sparse=True)
 
 
 def _sampled(field: FloatArray, at: Sequence[FloatArray]) -> FloatArray:
@@ -168,16 +191,10 @@ def _corners(field: FloatArray, pick: np.ufunc) -> FloatArray:
     return field
 
 
-def _at_faces(faces: list[FloatArray], axis: int) -> list[FloatArray]:
-    """All three velocity components at the faces across `axis`."""
-    components = []
-    for other, face in enumerate(faces):
-        if other != axis:
-            centred = _pair_mean(face, other)
-            width = [(1, 1) if a == axis else (0, 0) for a in AXES]
-            face = _pair_mean(np.pad(centred, width, mode="edge"), axis)
-        components.append(face)
-    return components
+def _at_faces(centred: Sequence[FloatArray], axis: int) -> list[FloatArray]:
+    """Fields at cell centres, averaged to the faces across `axis`."""
+    width = [(1, 1) if a == axis else (0, 0) for a in AXES]
+    return [_pair_mean(np.pad(field, width, mode="edge"), axis) for field in centred]
 
 
 def _confinement(velocity: FloatArray) -> FloatArray:

@@ -1,0 +1,181 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vnca.errors import GridError, OptionError
+from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
+from vnca.typing import BoolArray, FloatArray
+from vnca.volume import Volume
+
+
+def mask(shape: tuple[int, int, int], *cells: tuple[int, int, int]) -> BoolArray:
+    result = np.zeros(shape, np.bool_)
+    for cell in cells:
+        result[cell] = True
+    return result
+
+
+def test_a_linear_flow_on_faces_is_exact_at_centres() -> None:
+    x, y, z = np.indices((6, 5, 7), dtype=np.float32)
+    # Faces lie half a cell below the centres that share their index.
+    faces = np.stack([x - 0.5, 2 * (y - 0.5), x + 3 * (z - 0.5)], axis=-1)
+    centres = centred(faces, np.ones((6, 5, 7), np.bool_))
+    expected = np.stack([x, 2 * y, x + 3 * z], axis=-1)[:-1, :-1, :-1]
+    np.testing.assert_allclose(centres, expected, atol=1e-6)
+
+
+def test_faces_that_are_not_stored_do_not_slow_the_edge_of_the_smoke() -> None:
+    faces = np.zeros((4, 3, 3, 3), np.float32)
+    stored = mask((4, 3, 3), (1, 1, 1), (2, 1, 1))
+    faces[1, 1, 1], faces[2, 1, 1] = (2, 5, 7), (4, 5, 7)
+    centres = centred(faces, stored)
+    np.testing.assert_array_equal(centres[1, 1, 1], (3, 5, 7))
+    np.testing.assert_array_equal(centres[2, 1, 1], (4, 5, 7))
+    assert not centres[0].any()
+
+
+def test_components_at_centres_are_left_alone() -> None:
+    values = np.random.default_rng(0).standard_normal((4, 4, 4, 3)).astype(np.float32)
+    centres = centred(values, np.ones((4, 4, 4), np.bool_), (False, True, False))
+    inner = values[:-1, :-1, :-1]
+    np.testing.assert_array_equal(centres[..., [0, 2]], inner[..., [0, 2]])
+    np.testing.assert_array_equal(centres[..., 1], 0.5 * (inner[..., 1] + values[:-1, 1:, :-1, 1]))
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.tuples(*[st.floats(-100, 100, width=32)] * 3), st.integers(0, 2**32 - 1), st.integers(0, 4)
+)
+def test_a_constant_wind_is_continued_exactly(
+    wind: tuple[float, float, float], seed: int, layers: int
+) -> None:
+    known = np.random.default_rng(seed).random((7, 6, 5)) < 0.05
+    constant = np.broadcast_to(np.float32(wind), (7, 6, 5, 3))
+    garbage = np.where(known[..., None], constant, np.float32(1e30))
+    velocity, filled = extrapolated(garbage, known, layers)
+    assert (velocity[filled] == np.float32(wind)).all()
+    assert not velocity[~filled].any()
+
+
+def test_velocity_reaches_just_as_far_as_asked() -> None:
+    known = mask((9, 9, 9), (4, 4, 4))
+    steps = np.abs(np.indices(known.shape) - 4).sum(axis=0)
+    for layers in range(5):
+        _, filled = extrapolated(np.ones((9, 9, 9, 3), np.float32), known, layers)
+        np.testing.assert_array_equal(filled, steps <= layers)
+
+
+def test_a_new_cell_is_the_mean_of_its_known_neighbours() -> None:
+    known = mask((3, 3, 1), (0, 1, 0), (1, 0, 0))
+    velocity = np.zeros((3, 3, 1, 3), np.float32)
+    velocity[0, 1, 0], velocity[1, 0, 0] = (2, 0, 4), (4, 1, 0)
+    filled, _ = extrapolated(velocity, known, 1)
+    np.testing.assert_array_equal(filled[1, 1, 0], (3, 0.5, 2))
+    np.testing.assert_array_equal(filled[2, 0, 0], (4, 1, 0))
+    np.testing.assert_array_equal(filled[known], velocity[known])
+
+
+@pytest.mark.parametrize("shape", [(0, 0, 0), (1, 1, 1), (3, 1, 2)])
+def test_nothing_known_stays_still(shape: tuple[int, int, int]) -> None:
+    velocity, filled = extrapolated(np.ones((*shape, 3), np.float32), np.zeros(shape, bool), 3)
+    assert velocity.shape == (*shape, 3)
+    assert not velocity.any()
+    assert not filled.any()
+
+
+def test_units_become_cells_per_frame() -> None:
+    stretched = np.diag([0.5, 0.25, 0.1, 1.0])
+    wind = np.array([1.0, 1.0, 1.0])
+
+    def converted(units: str, fps: float = 20, time_scale: float = 1) -> list[float]:
+        matrix = cells_per_frame(
+            units,  # pyright: ignore[reportArgumentType]
+            fps=fps,
+            time_scale=time_scale,
+            index_to_world=stretched,
+        )
+        return (matrix @ wind).tolist()
+
+    assert converted("cells/frame") == [1, 1, 1]
+    assert converted("m/s") == pytest.approx([0.1, 0.2, 0.5])
+    assert converted("m/s", time_scale=0.5) == pytest.approx([0.05, 0.1, 0.25])
+    assert converted("mantaflow", fps=25) == pytest.approx([0.1] * 3)
+    assert converted("mantaflow", fps=24, time_scale=0.4) == pytest.approx([1 / 24] * 3)
+    with pytest.raises(OptionError, match="velocity_units: expected one of cells/frame, m/s"):
+        converted("km/h")
+    with pytest.raises(OptionError, match="fps: expected a positive number, got 0"):
+        converted("m/s", fps=0)
+    with pytest.raises(OptionError, match="time_scale: expected a positive number, got nan"):
+        converted("m/s", time_scale=float("nan"))
+
+
+def test_metres_per_second_follow_a_rotated_grid() -> None:
+    rotated = np.eye(4)
+    rotated[:3, :3] = 0.1 * np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])  # index x is world y
+    matrix = cells_per_frame("m/s", fps=1, time_scale=1, index_to_world=rotated)
+    np.testing.assert_allclose(matrix @ [0, 1, 0], [10, 0, 0], atol=1e-12)
+
+
+def swirl(angle: float, *, refilled: bool = False, frame: int = 0) -> Volume:
+    """Blobs turned about the z axis; the velocity turns them by 0.2 a frame."""
+    x, y, z = np.indices((28, 28, 10), dtype=np.float32)
+    x, y, z = x - 13.5, y - 13.5, z - 4.5
+    u = x * np.cos(angle) + y * np.sin(angle)
+    v = y * np.cos(angle) - x * np.sin(angle)
+    density = np.exp(-((u - 7) ** 2 + v**2 + z**2) / 6) + np.exp(-(u**2 + (v + 8) ** 2 + z**2) / 5)
+    if refilled:
+        density = np.maximum(density, np.exp(-((x + 8) ** 2 + y**2 + z**2) / 4))
+    velocity = 0.2 * np.stack([-y, x, 0 * z], axis=-1)
+    velocity[density < 1e-3] = 0  # as in files: stored under the smoke only
+    return Volume(density.astype(np.float32), velocity, (0, 0, 0), np.eye(4), frame)
+
+
+def scaled(volume: Volume, factor: float) -> Volume:
+    assert volume.velocity is not None
+    return replace(volume, velocity=volume.velocity * np.float32(factor))
+
+
+@pytest.mark.parametrize("scale", [0.4, 0.8, 1.0, 2.5])
+@pytest.mark.parametrize("refilled", [False, True], ids=["", "with a source"])
+def test_a_wrong_velocity_scale_is_recovered(scale: float, refilled: bool) -> None:
+    first, second = swirl(0, refilled=refilled), swirl(0.2, refilled=refilled)
+    assert fit_velocity_scale(scaled(first, 1 / scale), second) == pytest.approx(scale, rel=0.03)
+
+
+def test_the_fit_follows_boxes_that_move() -> None:
+    def cut(volume: Volume, low: int, high: int) -> Volume:
+        assert volume.velocity is not None
+        inner = np.s_[low:high, 1:27]
+        return Volume(
+            volume.density[inner], volume.velocity[inner], (low, 1, 0), np.eye(4), volume.frame
+        )
+
+    fitted = fit_velocity_scale(cut(swirl(0), 2, 28), cut(swirl(0.2), 0, 27))
+    assert fitted == pytest.approx(1, rel=0.03)
+
+
+def test_a_fit_without_motion_or_velocity_is_refused() -> None:
+    still = scaled(swirl(0, frame=7), 0)
+    with pytest.raises(GridError, match="frames 7 and 8: no moving smoke"):
+        fit_velocity_scale(still, swirl(0.2, frame=8))
+    with pytest.raises(GridError, match="frame 7: no velocity"):
+        fit_velocity_scale(replace(still, velocity=None), swirl(0.2))
+    empty = np.zeros((0, 0, 0), np.float32), np.zeros((0, 0, 0, 3), np.float32)
+    nothing = Volume(*empty, (0, 0, 0), np.eye(4), 1)
+    with pytest.raises(GridError, match="no moving smoke"):
+        fit_velocity_scale(nothing, replace(nothing, frame=2))
+
+
+@pytest.mark.parametrize("factor", [-1, 0.1], ids=["mirrored", "far too slow"])
+def test_a_velocity_no_scale_can_mend_is_refused(factor: float) -> None:
+    with pytest.raises(GridError, match=r"no velocity scale up to 4 .* check --velocity-units"):
+        fit_velocity_scale(scaled(swirl(0), factor), swirl(0.2))
+
+
+def test_extrapolation_keeps_single_precision() -> None:
+    values: FloatArray = np.ones((3, 3, 3, 3), np.float32)
+    velocity, _ = extrapolated(values, mask((3, 3, 3), (1, 1, 1)), 1)
+    assert velocity.dtype == np.float32
