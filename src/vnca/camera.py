@@ -25,10 +25,8 @@ Point = tuple[float, float, float]
 class Camera(Protocol):
     """What a renderer needs to know of a camera."""
 
-    @property
-    def near(self) -> float:
-        """Depth before which nothing is seen."""
-        ...
+    near: ClassVar[float]
+    """Depth before which nothing is seen."""
 
     def rays(self, rows: int, columns: int) -> tuple[FloatArray, FloatArray]:
         """One ray through each pixel centre: `point = origin + depth * direction`.

@@ -10,13 +10,13 @@ from typing import Annotated, Literal
 import tyro
 
 from vnca.automaton.model import Model
+from vnca.automaton.stepper import stepper
 from vnca.cli.film import Film, FilmConfig
 from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.sequence import open_sequence, sequence_box, volumes
 from vnca.errors import OptionError
 from vnca.io.smoke import SmokeFormat, write_painted
-from vnca.kernels.update import stepper
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.roll import stylize
 

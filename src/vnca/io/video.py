@@ -214,6 +214,7 @@ class _WebP(_Gif):
 
 
 _ENCODERS = {".mp4": _Mp4, ".gif": _Gif, ".webp": _WebP}
+SUFFIXES = tuple(_ENCODERS)
 
 
 def _durations(count: int, fps: Fraction, *, unit: int) -> list[int]:

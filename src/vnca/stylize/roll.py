@@ -9,7 +9,6 @@ Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -17,23 +16,14 @@ from vnca.automaton.domain import Domain
 from vnca.automaton.paint import colours, density_factors
 from vnca.automaton.priors import priors
 from vnca.automaton.rule import SMOKE_THRESHOLD, Rule
+from vnca.automaton.stepper import Step
 from vnca.kernels.update.mask import changing_rows
 from vnca.stylize.config import StylizeConfig
-from vnca.typing import Box, FloatArray, IntArray
+from vnca.typing import Box, FloatArray
 from vnca.volume import Volume
 
 UNPAINTED = 1.0
 """Linear colour of smoke that the rule does not paint: white."""
-
-
-class Step(Protocol):
-    """One step of a rule, on whatever hardware."""
-
-    def __call__(
-        self, state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
-    ) -> FloatArray:
-        """The state after a step in which `rows` change; see `vnca.kernels.update`."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,6 +83,8 @@ class TrainConfig:
     """Cells live up to this far from the smoke."""
     features: str = "edges"
     """Weights of VGG16: edges, imagenet or a path."""
+    backend: Literal["auto", "native", "reference"] = "auto"
+    """What computes the automaton."""
     seed: int = 0
     """Same seed, same machine, same result."""
 

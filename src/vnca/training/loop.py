@@ -13,8 +13,9 @@ from torch import Tensor
 
 from vnca.automaton.rule import DENSITY_CHANGE, Rule, Scales
 from vnca.features.vgg import VGG16
+from vnca.kernels.update.backend import torch_step
 from vnca.kernels.update.mask import changing_rows
-from vnca.kernels.update.reference import Weights, update
+from vnca.kernels.update.reference import Weights
 from vnca.kernels.update.stencil import stencil
 from vnca.losses.appearance import AppearanceLoss
 from vnca.losses.overflow import overflow
@@ -88,6 +89,7 @@ class Trainer:
                 for w in (rule.hidden, rule.bias, rule.output)
             )
         )
+        self._step = torch_step(config.backend, device=torch.device(device).type)
         self._stencil = torch.from_numpy(
             stencil(
                 sobel_divisor=config.rule.sobel_divisor,
@@ -162,7 +164,7 @@ class Trainer:
                 step=step,
                 probability=self.config.rule.update_probability,
             )
-            state = update(
+            state = self._step(
                 state,
                 torch.from_numpy(rows).to(state.device),
                 self.scene.neighbours,
@@ -182,7 +184,10 @@ class Trainer:
         view = self.config.view
         azimuth = self._random.uniform(0, 360)
         elevation = self._random.uniform(-view.elevation, view.elevation)
-        return self.scene.look(state, self.scene.camera(azimuth, elevation), view)
+        # Samples at random depths: no pattern can hide between them.
+        offset = float(self._random.uniform()) if view.mode == "sane" else 0.0
+        camera = self.scene.camera(azimuth, elevation)
+        return self.scene.look(state, camera, view, offset=offset)
 
     def _picture(self, view: View) -> tuple[Tensor, Tensor]:
         """As the appearance loss wants it: sRGB `[1, 3, r, c]` and opacity `[1, r, c]`."""

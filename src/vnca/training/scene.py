@@ -70,9 +70,18 @@ class Scene:
         )
 
     def look(
-        self, state: Tensor, camera: Camera, view: ViewConfig, *, size: int | None = None
+        self,
+        state: Tensor,
+        camera: Camera,
+        view: ViewConfig,
+        *,
+        size: int | None = None,
+        offset: float = 0.0,
     ) -> View:
-        """The smoke as `state` paints it; differentiable in the state."""
+        """The smoke as `state` paints it; differentiable in the state.
+
+        `size` is that of the view unless given; `offset` shifts all samples along their rays.
+        """
         cells = state[:-1]
         colour = srgb_to_linear((cells[:, COLOUR] + 0.5).clamp(0, 1))
         change = cells[:, DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
@@ -85,6 +94,7 @@ class Scene:
             columns=size,
             gamma=self.gamma,
             step=view.step,
+            offset=offset,
             mode=view.mode,
         )
 
