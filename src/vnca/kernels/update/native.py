@@ -14,7 +14,7 @@ from vnca.errors import BackendUnavailableError, ShapeError
 from vnca.typing import FloatArray, IntArray
 
 try:
-    from vnca.kernels.update import _native  # pyright: ignore[reportMissingModuleSource]
+    import vnca.kernels.update._native as _native  # pyright: ignore[reportMissingModuleSource]
 except ImportError as error:
     _native: Any = None
     _reason = str(error)
