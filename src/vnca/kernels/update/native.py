@@ -14,7 +14,7 @@ from vnca.errors import BackendUnavailableError, ShapeError
 from vnca.typing import FloatArray, IntArray
 
 try:
-    from vnca.kernels.update import _native
+    import vnca.kernels.update._native as _native  # pyright: ignore[reportMissingModuleSource]
 except ImportError as error:
     _native: Any = None
     _reason = str(error)
@@ -31,7 +31,7 @@ def unavailable() -> str | None:
 
 
 def instructions() -> list[str]:
-    """Instruction sets that the kernel can use on this machine, the one it uses by default first."""
+    """Instruction sets that the kernel can use on this machine, the default first."""
     return _extension().instructions()
 
 

@@ -53,11 +53,11 @@ class _Update(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, *grad_outputs: Tensor) -> tuple[Tensor | None, ...]:
+    def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
+        ctx: Any, *grad_outputs: Tensor
+    ) -> tuple[Tensor | None, ...]:
         arrays = map(_array, (*ctx.saved_tensors, *grad_outputs))
-        to_state, *to_weights = map(
-            torch.from_numpy, native.backward(*arrays, threads=ctx.threads)
-        )
+        to_state, *to_weights = map(torch.from_numpy, native.backward(*arrays, threads=ctx.threads))
         return to_state, None, None, None, *to_weights, None, None
 
 

@@ -1,0 +1,35 @@
+from vnca.typing import FloatArray, IntArray
+
+def instructions() -> list[str]: ...
+def forward(
+    state: FloatArray,
+    rows: IntArray,
+    neighbours: IntArray,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    out: FloatArray,
+    threads: int,
+    instructions: str,
+    /,
+) -> None: ...
+def backward(
+    state: FloatArray,
+    rows: IntArray,
+    neighbours: IntArray,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    gradient: FloatArray,
+    to_state: FloatArray,
+    to_hidden: FloatArray,
+    to_bias: FloatArray,
+    to_output: FloatArray,
+    threads: int,
+    instructions: str,
+    /,
+) -> None: ...

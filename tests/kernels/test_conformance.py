@@ -1,0 +1,240 @@
+"""Every backend of the update step against the reference in float64."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from vnca.automaton.domain import Border, Domain
+from vnca.errors import ShapeError
+from vnca.kernels.update import native, reference
+from vnca.kernels.update.mask import changing_rows
+from vnca.kernels.update.native_autograd import update as native_update
+from vnca.kernels.update.reference import Weights
+from vnca.kernels.update.stencil import stencil
+from vnca.typing import AnyArray, FloatArray, IntArray
+
+INSTRUCTIONS = native.instructions() if native.unavailable() is None else []
+needs_native = pytest.mark.skipif(not INSTRUCTIONS, reason="the native kernel was not built")
+
+
+@dataclasses.dataclass(frozen=True)
+class Problem:
+    """The arguments of a step, and a gradient of its result."""
+
+    state: FloatArray
+    rows: IntArray
+    neighbours: IntArray
+    priors: FloatArray
+    hidden: FloatArray
+    bias: FloatArray
+    output: FloatArray
+    stencil: FloatArray
+    gradient: FloatArray
+
+    def with_(self, **changes: AnyArray) -> "Problem":
+        return dataclasses.replace(self, **changes)
+
+    def forward(self, **options: object) -> FloatArray:
+        return native.forward(*self._arrays[:-1], **options)  # pyright: ignore
+
+    def backward(self, **options: object) -> tuple[FloatArray, ...]:
+        return native.backward(*self._arrays, **options)  # pyright: ignore
+
+    @property
+    def _arrays(self) -> tuple[AnyArray, ...]:
+        return tuple(getattr(self, field.name) for field in dataclasses.fields(self))
+
+
+def problem(
+    shape: tuple[int, int, int] = (7, 9, 11),
+    *,
+    channels: int = 12,
+    hidden: int = 32,
+    priors: int = 7,
+    occupancy: float = 1.0,
+    probability: float = 0.5,
+    border: Border = "replicate",
+) -> Problem:
+    random = np.random.default_rng(4)
+
+    def draw(*lengths: int, scale: float = 1.0) -> FloatArray:
+        return (scale * random.standard_normal(lengths)).astype(np.float32)
+
+    domain = Domain.from_mask(random.random(shape) < occupancy, (-3, 0, 5), border=border)
+    n = len(domain)
+    state = draw(n + 1, channels)
+    state[-1] = 0
+    return Problem(
+        state,
+        changing_rows(domain.hashes, seed=0, step=1, probability=probability),
+        domain.neighbours,
+        draw(n, priors),
+        draw(hidden, 5 * channels + priors, scale=0.1),
+        draw(hidden, scale=0.1),
+        draw(channels, hidden, scale=0.1),
+        stencil(sobel_divisor=30.0),
+        draw(n + 1, channels),
+    )
+
+
+Update = Callable[..., Tensor]
+
+
+def run(update: Update, p: Problem, dtype: torch.dtype) -> dict[str, AnyArray]:
+    """The new state and the gradients."""
+
+    def tensor(array: AnyArray, *, trained: bool = False) -> Tensor:
+        return torch.tensor(array, dtype=dtype, requires_grad=trained)
+
+    state = tensor(p.state, trained=True)
+    weights = Weights(*(tensor(w, trained=True) for w in (p.hidden, p.bias, p.output)))
+    result = update(
+        state,
+        torch.tensor(p.rows),
+        torch.tensor(p.neighbours),
+        tensor(p.priors),
+        weights,
+        tensor(p.stencil),
+    )
+    gradients = torch.autograd.grad(result, (state, *weights), tensor(p.gradient))
+    names = ("state", "to_state", "to_hidden", "to_bias", "to_output")
+    return dict(zip(names, (t.detach().numpy() for t in (result, *gradients)), strict=True))
+
+
+def assert_conforms(got: dict[str, AnyArray], expected: dict[str, AnyArray]) -> None:
+    for name, exact in expected.items():
+        scale = np.abs(exact).max(initial=1e-30)
+        np.testing.assert_allclose(got[name] / scale, exact / scale, atol=3e-6, err_msg=name)
+
+
+CASES = {
+    "paper": {"shape": (33, 8, 25), "hidden": 128, "occupancy": 0.8},
+    "default": {"shape": (16, 17, 12), "hidden": 96},
+    "one cell": {"shape": (1, 1, 1), "channels": 5, "hidden": 17, "priors": 0, "probability": 1},
+    "one row of cells": {"shape": (1, 1, 65), "channels": 1, "hidden": 1, "priors": 1},
+    "odd": {"channels": 5, "hidden": 17, "priors": 3, "occupancy": 0.4},
+    "every cell changes": {"probability": 1, "hidden": 64},
+    "no cell changes": {"probability": 1e-9},
+    "no cell": {"occupancy": 0},
+    "wraps": {"shape": (9, 3, 8), "border": "circular", "occupancy": 0.7},
+    "wraps onto itself": {"shape": (2, 1, 3), "border": "circular", "probability": 1},
+    "wide": {"shape": (5, 6, 7), "channels": 64, "hidden": 512, "priors": 16},
+    "many channels": {"channels": 20, "hidden": 100, "priors": 2},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("backend", ["reference", *INSTRUCTIONS])
+def test_a_step_and_all_its_gradients_agree_with_the_reference(case: str, backend: str) -> None:
+    p = problem(**CASES[case])
+    exact = run(reference.update, p, torch.float64)
+    if backend == "reference":
+        assert_conforms(run(reference.update, p, torch.float32), exact)
+    else:
+        names = ("to_state", "to_hidden", "to_bias", "to_output")
+        state = p.forward(instructions=backend)
+        gradients = zip(names, p.backward(instructions=backend), strict=True)
+        assert_conforms({"state": state, **dict(gradients)}, exact)
+
+
+@needs_native
+def test_training_gets_the_native_gradients() -> None:
+    p = problem(occupancy=0.6)
+    got = run(native_update, p, torch.float32)
+    assert_conforms(got, run(reference.update, p, torch.float64))
+    np.testing.assert_array_equal(got["to_state"], p.backward()[0])
+
+
+@needs_native
+@pytest.mark.parametrize("backend", INSTRUCTIONS)
+def test_results_are_the_same_bits_in_every_run_and_with_any_number_of_threads(
+    backend: str,
+) -> None:
+    p = problem((24, 17, 30), occupancy=0.7)
+    options = [{"threads": threads, "instructions": backend} for threads in (1, 1, 2, 3, 8)]
+    for results in zip(*([p.forward(**o), *p.backward(**o)] for o in options), strict=True):
+        assert len({array.tobytes() for array in results}) == 1
+
+
+@needs_native
+def test_every_value_of_the_output_is_written() -> None:
+    p = problem(occupancy=0.6, probability=0.1)
+    out = np.full_like(p.state, np.nan)
+    assert p.forward(out=out) is out
+    np.testing.assert_array_equal(out, p.forward())
+    untouched = np.setdiff1d(np.arange(len(p.state)), p.rows)
+    np.testing.assert_array_equal(out[untouched], p.state[untouched])
+
+
+@needs_native
+def test_a_state_gone_wrong_stays_visible_and_local() -> None:
+    p = problem((20, 4, 4), probability=1)
+    bad = p.state.copy()
+    bad[0, 3] = np.nan
+    wrong = np.isnan(p.with_(state=bad).forward()).any(axis=1)
+    reached = (p.neighbours == 0).any(axis=0)
+    np.testing.assert_array_equal(wrong[:-1], reached)
+
+
+@needs_native
+def test_arrays_in_read_only_memory_can_be_used() -> None:
+    p = problem()
+    expected = p.forward()
+    for field in dataclasses.fields(p):
+        getattr(p, field.name).setflags(write=False)
+    np.testing.assert_array_equal(p.forward(), expected)
+
+
+def neighbours_with(p: Problem, value: int) -> IntArray:
+    neighbours = p.neighbours.copy()
+    neighbours[5, p.rows[-1]] = value
+    return neighbours
+
+
+@needs_native
+@pytest.mark.parametrize(
+    ("said", "spoil"),
+    [
+        ("state", lambda p: {"state": p.state[:-1]}),
+        ("state", lambda p: {"state": p.state.astype(np.float64)}),
+        ("state", lambda p: {"state": np.asfortranarray(p.state)}),
+        ("state", lambda p: {"state": p.state[:, 0]}),
+        ("rows", lambda p: {"rows": p.rows[::-1].copy()}),
+        ("rows", lambda p: {"rows": p.rows[::2]}),
+        ("rows", lambda p: {"rows": p.rows.astype(np.int64)}),
+        ("rows", lambda p: {"rows": np.array([4, 4], np.int32)}),
+        ("rows", lambda p: {"rows": np.array([-1, 4], np.int32)}),
+        ("rows", lambda p: {"rows": np.array([len(p.priors)], np.int32)}),
+        ("neighbours", lambda p: {"neighbours": p.neighbours[:26]}),
+        ("neighbours", lambda p: {"neighbours": neighbours_with(p, -1)}),
+        ("neighbours", lambda p: {"neighbours": neighbours_with(p, len(p.state))}),
+        ("neighbours", lambda p: {"neighbours": neighbours_with(p, np.iinfo(np.int32).max)}),
+        ("priors", lambda p: {"priors": p.priors[:-1]}),
+        ("hidden weights", lambda p: {"hidden": p.hidden[:, :-1].copy()}),
+        ("hidden bias", lambda p: {"bias": p.bias[:-1]}),
+        ("output weights", lambda p: {"output": p.output.T.copy()}),
+        ("stencil", lambda p: {"stencil": p.stencil[::-1].copy()}),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused_by_name(
+    said: str, spoil: Callable[[Problem], dict[str, AnyArray]]
+) -> None:
+    p = problem()
+    spoiled = p.with_(**spoil(p))
+    with pytest.raises(ShapeError, match=said):
+        spoiled.forward(out=np.empty_like(p.state))
+    with pytest.raises(ShapeError, match=said):
+        spoiled.backward()
+
+
+@needs_native
+def test_an_output_that_overlaps_the_state_is_refused() -> None:
+    p = problem()
+    with pytest.raises(ShapeError, match="shares memory"):
+        p.forward(out=p.state)
+    with pytest.raises(ShapeError, match="out: expected shape"):
+        p.forward(out=p.state[1:].copy())
