@@ -230,7 +230,7 @@ def _metadata(grid: Grid, flags: Compression, writer: _TreeWriter) -> Metadata:
 def _bytes_in_memory(value_type: ValueType, uppers: int, lowers: int, leaves: int) -> int:
     """What the tree takes in OpenVDB 10. Reference: `tree/*.h`, `memUsage`."""
     slot = -(-value_type.size // 8) * 8
-    root = 1296 + -(-2 * value_type.size // 8) * 8
+    root = 1288 + 2 * slot
     leaf = 144 if value_type.name == "bool" else 96 + LEAF_CELLS * value_type.size
     inner = sum(
         count * (slots * slot + slots // 4 + 12)

@@ -86,7 +86,8 @@ class _Topology:
         tiles = np.frombuffer(cursor.take(tile_count * record.itemsize), record)
         self._check_root_origins(tiles["origin"])
         values, active = tiles["value"].astype(value_type.dtype), tiles["active"] != 0
-        self._keep_tiles(tiles["origin"], UPPER_EDGE, values, active)
+        kept = self._is_tile(values, active)
+        self._add_tiles(tiles["origin"][kept], UPPER_EDGE, values[kept], active[kept])
         seen = {tuple(origin) for origin in tiles["origin"].tolist()}
         for _ in range(child_count):
             origin = np.array(cursor.unpack("3i"), np.int32)
@@ -109,18 +110,18 @@ class _Topology:
         active = bits_of(self.cursor.take(slots // 8))
         values = self.codec.read_values(self.cursor, active[None], is_leaf=False)[0]
         per_edge = round(slots ** (1 / 3))
-        tiles = np.flatnonzero(~has_child)
+        tiles = np.flatnonzero(self._is_tile(values, active) & ~has_child)
         tile_origins = origin + slot_origins(tiles, per_edge, slot_edge)
-        self._keep_tiles(tile_origins, slot_edge, values[tiles], active[tiles])
+        self._add_tiles(tile_origins, slot_edge, values[tiles], active[tiles])
         return origin + slot_origins(np.flatnonzero(has_child), per_edge, slot_edge)
 
-    def _keep_tiles(
-        self, origins: AnyArray, edge: int, values: AnyArray, active: BoolArray
-    ) -> None:
-        kept = active | (values != self.codec.background).any(axis=-1)
-        edges = np.full(int(kept.sum()), edge, np.int32)
-        values = self.codec.value_type.shaped(values[kept])
-        self.tiles.append(Tiles(origins[kept], edges, values, active[kept]))
+    def _is_tile(self, values: AnyArray, active: BoolArray) -> BoolArray:
+        return active | (values != self.codec.background).any(axis=-1)
+
+    def _add_tiles(self, origins: AnyArray, edge: int, values: AnyArray, active: BoolArray) -> None:
+        if len(origins):
+            edges = np.full(len(origins), edge, np.int32)
+            self.tiles.append(Tiles(origins, edges, self.codec.value_type.shaped(values), active))
 
 
 def read_tree(

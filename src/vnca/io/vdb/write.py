@@ -54,11 +54,13 @@ def write_vdb(
     metadata: Mapping[str, Any] | None = None,
     compression: str = "blosc",
 ) -> None:
-    """Write a VDB file (version 224), the same bytes for the same input.
+    """Write a VDB file, the same bytes for the same input.
 
     A `Grid` is encoded, its inactive values omitted where they are background. A `GridHeader` of
     an open file is copied: its metadata, transform and packed values arrive byte for byte, also
-    of kinds that cannot be read here. One grid is in memory at a time.
+    of kinds that cannot be read here; it passes through in pieces, never whole in memory.
+
+    The version is 224, or 225 if there is a grid of type `half`, which older libraries lack.
 
     Args:
         path: The file to write; it appears whole or not at all.
