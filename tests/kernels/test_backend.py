@@ -5,8 +5,10 @@ import pytest
 
 from vnca.automaton.domain import Domain
 from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.automaton.stepper import stepper
 from vnca.errors import BackendUnavailableError, OptionError
-from vnca.kernels.update import backend, choose, native, stepper, torch_step
+from vnca.kernels.update import backend, native
+from vnca.kernels.update.backend import choose, torch_step
 
 needs_native = pytest.mark.skipif(native.unavailable() is not None, reason="not built")
 

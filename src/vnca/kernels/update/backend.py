@@ -4,16 +4,13 @@ import importlib.util
 import sys
 from collections.abc import Callable
 from functools import cache, partial
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Literal
 
 from vnca.errors import BackendUnavailableError, OptionError
 from vnca.kernels.update import native
-from vnca.kernels.update.stencil import stencil
-from vnca.typing import FloatArray, IntArray
+from vnca.typing import FloatArray
 
 Backend = Literal["native", "reference"]
-ArrayStep: TypeAlias = Callable[[FloatArray, IntArray, IntArray, FloatArray], FloatArray]
-"""The state after a step, from the state, the rows that change, the neighbours and the priors."""
 
 
 def choose(backend: str = "auto", *, device: str = "cpu") -> Backend:
@@ -62,67 +59,16 @@ def torch_step(
     return update
 
 
-class Config(Protocol):
-    """What a step must know of a rule's shape."""
+def array_step(backend: str = "auto", *, threads: int | None = None) -> Callable[..., FloatArray]:
+    """The step on arrays, called as `vnca.kernels.update.native.forward` is, up to `stencil`.
 
-    @property
-    def sobel_divisor(self) -> float:
-        """Divisor of the Sobel filters."""
-        ...
-
-    @property
-    def laplacian_divisor(self) -> float:
-        """Divisor of the Laplacian."""
-        ...
-
-
-class Rule(Protocol):
-    """What a step must know of a rule."""
-
-    @property
-    def hidden(self) -> FloatArray:
-        """W1 `[H, 5C + P]`."""
-        ...
-
-    @property
-    def bias(self) -> FloatArray:
-        """b1 `[H]`."""
-        ...
-
-    @property
-    def output(self) -> FloatArray:
-        """W2 `[C, H]`."""
-        ...
-
-    @property
-    def config(self) -> Config:
-        """Its shape."""
-        ...
-
-
-def stepper(rule: Rule, backend: str = "auto", *, threads: int | None = None) -> ArrayStep:
-    """The step of a rule on arrays, for applying it; of the backends only the reference uses torch.
-
-    Args:
-        rule: The trained rule.
-        backend: As for `choose`.
-        threads: How many the native kernel uses; by default one for each core. The reference uses
-            as many as torch does.
+    Of the backends only the reference uses torch, and as many threads as torch does.
     """
-    filters = stencil(
-        sobel_divisor=rule.config.sobel_divisor, laplacian_divisor=rule.config.laplacian_divisor
-    )
     if choose(backend) == "native":
-        step = partial(native.forward, threads=threads)
-    else:
-        from vnca.kernels.update.reference import update_arrays as step
+        return partial(native.forward, threads=threads)
+    from vnca.kernels.update.reference import update_arrays
 
-    def apply(
-        state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
-    ) -> FloatArray:
-        return step(state, rows, neighbours, priors, rule.hidden, rule.bias, rule.output, filters)
-
-    return apply
+    return update_arrays
 
 
 def _native_unavailable(device: str) -> str | None:

@@ -1,0 +1,35 @@
+"""A rule bound to the kernel that applies it."""
+
+from collections.abc import Callable
+
+from vnca.automaton.rule import Rule
+from vnca.kernels.update.backend import array_step
+from vnca.kernels.update.stencil import stencil
+from vnca.typing import FloatArray, IntArray
+
+Step = Callable[[FloatArray, IntArray, IntArray, FloatArray], FloatArray]
+"""A step: the new state from state, changing rows, neighbours and priors."""
+
+
+def stepper(rule: Rule, backend: str = "auto", *, threads: int | None = None) -> Step:
+    """The step of a rule on arrays.
+
+    Args:
+        rule: Its weights and filters.
+        backend: `auto`, `native` or `reference`.
+        threads: How many the native kernel uses; by default one for each core.
+
+    Raises:
+        BackendUnavailableError: If the backend asked for, or any at all, cannot run here.
+    """
+    apply = array_step(backend, threads=threads)
+    filters = stencil(
+        sobel_divisor=rule.config.sobel_divisor, laplacian_divisor=rule.config.laplacian_divisor
+    )
+
+    def step(
+        state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
+    ) -> FloatArray:
+        return apply(state, rows, neighbours, priors, rule.hidden, rule.bias, rule.output, filters)
+
+    return step
