@@ -28,7 +28,7 @@ class AppearanceConfig:
     """Weight of style matching; 0 leaves it out."""
     moments: float = 1.0
     """Weight of the features' means and covariances; 0 leaves them out."""
-    pixels: float = 1.0
+    pixels: float = 5.0
     """Weight of the palette, the picture itself as layer zero; 0 leaves it out."""
     colour: bool = True
     """Compare the pictures in colour."""
@@ -80,6 +80,11 @@ class _Layer(NamedTuple):
 class AppearanceLoss:
     """Distance between pictures and one style image, over several layers of VGG16.
 
+    Each layer's features are divided by the root mean square of the style image's, in colour
+    and in grey. Cosines do not notice; means and covariances, which the paper compares as
+    they are, then weigh alike in all layers and for all weights of VGG16. Unscaled, they
+    differ by orders of magnitude: one set of weights takes input in ±2, another in ±128.
+
     Attributes:
         background: Mean colour of the style image, linear RGB `[3]`. Pictures are best
             composited over it, so that thin smoke does not read as black paint.
@@ -113,7 +118,8 @@ class AppearanceLoss:
             raise ShapeError(f"style image: expected [r, c, 3], got {style_image.shape}")
         self.config = config
         self._vgg = vgg
-        linear = torch.from_numpy(style_image).to(vgg.mean.device).permute(2, 0, 1)[None]
+        linear = torch.tensor(style_image, dtype=torch.float32, device=vgg.mean.device)
+        linear = linear.permute(2, 0, 1)[None]
         self.background = linear.mean((0, 2, 3))
         shorter = max(32, round(size * config.style_scale))
         self._generator = torch.Generator().manual_seed(self._seed)
@@ -174,7 +180,7 @@ class AppearanceLoss:
 
     def _compared(
         self, picture: Tensor, opacity: Tensor
-    ) -> Iterator[tuple[Float[Tensor, "n c"], _Layer]]:
+    ) -> Iterator[tuple[Float[Tensor, "_ _"], _Layer]]:
         """Feature sets of the smoke, each with the style's counterpart."""
         for maps, styles in zip(self._features(picture), self._layers, strict=True):
             chosen = self._chosen(opacity, maps[0])
@@ -194,17 +200,15 @@ class AppearanceLoss:
 
     def _described(self, maps: Tensor) -> _Layer:
         features = _positions(maps)[0]
-        scale = features.square().mean().sqrt().clamp_min(1e-12).item()
+        scale = features.square().mean().sqrt().item() or 1.0  # a silent layer stays as it is
         features = features / scale
         return _Layer(self._kept(features), moments(features), scale)
 
     def _kept(self, features: Tensor) -> Tensor:
         count = self.most_style_positions
-        return features[
-            sample_positions(len(features), count, self._generator, features.device)
-        ].clone()
+        return features[sample_positions(len(features), count, self._generator, features.device)]
 
-    def _chosen(self, opacity: Tensor, maps: Tensor) -> list[Int[Tensor, " n"]]:
+    def _chosen(self, opacity: Tensor, maps: Tensor) -> list[Int[Tensor, " _"]]:
         """For each picture, the positions of `maps` that show mostly smoke."""
         rows, columns = maps.shape[2:]
         shown = functional.adaptive_avg_pool2d(opacity.detach()[:, None], (rows, columns))
@@ -219,8 +223,8 @@ class AppearanceLoss:
 
     @staticmethod
     def _shown(
-        maps: Float[Tensor, "b c r k"], chosen: list[Int[Tensor, " n"]]
-    ) -> Iterator[Float[Tensor, "n c"]]:
+        maps: Float[Tensor, "b c r k"], chosen: list[Int[Tensor, " _"]]
+    ) -> Iterator[Float[Tensor, "_ c"]]:
         """The chosen vectors of every picture that has any."""
         for features, where in zip(_positions(maps), chosen, strict=True):
             if len(where):
