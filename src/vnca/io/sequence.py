@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import NamedTuple, overload
 
 from vnca.errors import OptionError, SequenceError
+from vnca.io.smoke_format import UP_AXES
 
-SUFFIXES = (".vdb", ".npz")
 MAX_FRAMES = 1_000_000
 _NUMBER = re.compile(r"%0?(?P<printf>\d*)d|\$F(?P<houdini>\d*)|(?P<hashes>#+)")
 _TRAILING = re.compile(r"\d{1,18}$", re.ASCII)
@@ -158,7 +158,7 @@ def _matching_number(path: Path) -> list[Frame]:
 
 def _folder_sequences(folder: Path) -> dict[str, list[Frame]]:
     """Sequences in a folder; Mantaflow's `d/` counts as one where nothing else is there."""
-    files = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in SUFFIXES]
+    files = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in UP_AXES]
     sequences = _sequences(files)
     if not sequences and (folder / "d").is_dir():
         sequences = _sequences(sorted((folder / "d").glob("*.npz")))

@@ -177,8 +177,8 @@ def fit_velocity_scale(first: Volume, second: Volume) -> float:
     best = int(np.argmin([mismatch(scale) for scale in tried]))
     if best in (0, len(tried) - 1):
         raise GridError(
-            f"frames {first.frame} and {second.frame}: no velocity scale up to {_FIT_MOST:g} carries "
-            "the smoke from one to the other; check --velocity-units, or set --velocity-scale"
+            f"frames {first.frame} and {second.frame}: no velocity scale up to {_FIT_MOST:g} "
+            "carries one to the other; check --velocity-units, or set --velocity-scale"
         )
     bounds = tried[best - 1], tried[best + 1]
     fit: Any = optimize.minimize_scalar(mismatch, bounds=bounds, method="bounded")

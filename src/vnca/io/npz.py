@@ -1,0 +1,166 @@
+"""Smoke in Mantaflow's npz layout, as published with earlier work on smoke stylization.
+
+A folder holds `d/%03d.npz` with density `[z, y, x]` or `[z, y, x, 1]` and `v/%03d.npz` with
+velocity `[z, y, x, 3]`, each under the key `x`. Components are in the order x, y, z and lie on the
+lower faces of their cells; up is +y. There is no voxel size: a cell is one unit of the world.
+
+Reference: Kim et al. 2019, "Transport-Based Neural Style Transfer for Smoke Simulations".
+"""
+
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.lib import format as npy
+
+from vnca.errors import FileFormatError, GridError
+from vnca.files import existing_file
+from vnca.io.smoke_format import (
+    NO_VELOCITY,
+    SmokeFormat,
+    StoredSmoke,
+    StoredVelocity,
+    single_precision,
+    upper_grown,
+)
+from vnca.typing import AnyArray, Box, FloatArray
+
+KEY = "x"
+MAX_VALUES = 2**31
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+
+
+def read_npz_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
+    """Density over the box of its non-zero cells, and velocity from the folder `v` beside `d`.
+
+    A file that is not in a folder `d`, or has no folder `v` beside it, has no velocity.
+
+    Raises:
+        FileFormatError: If a file is missing, truncated, or holds something else.
+        GridError: If density and velocity differ in extent, or values are not finite.
+    """
+    density = read_npz_density(path)
+    box = occupied_box(density)
+    domain = Box((0, 0, 0), density.shape)
+    beside = path.parent.parent / "v"
+    velocity = None
+    if format.velocity_grid != NO_VELOCITY and path.parent.name == "d" and beside.is_dir():
+        velocity = _stored_velocity(beside / path.name, domain, box, format.staggered is not False)
+    density = np.ascontiguousarray(density[box.slices(domain)])
+    return StoredSmoke(density, box.lower, np.eye(4), velocity)
+
+
+def npz_smoke_box(path: Path, format: SmokeFormat) -> Box:
+    """The box of the cells with density other than zero.
+
+    Raises:
+        FileFormatError: If the file is missing, truncated, or holds something else.
+    """
+    return occupied_box(read_npz_density(path))
+
+
+def read_npz_density(path: Path) -> FloatArray:
+    """`[x, y, z]` over the whole domain.
+
+    Raises:
+        FileFormatError: If the file is missing, truncated, or holds something else.
+        GridError: If values are not finite.
+    """
+    values = _read_array(path, "[z, y, x] or [z, y, x, 1]", components=(None, 1))
+    return _ours(path, values.reshape(values.shape[:3]))
+
+
+def read_npz_velocity(path: Path) -> FloatArray:
+    """`[x, y, z, 3]` over the whole domain, on lower faces as stored.
+
+    Raises:
+        FileFormatError: If the file is missing, truncated, or holds something else.
+        GridError: If values are not finite.
+    """
+    return _ours(path, _read_array(path, "[z, y, x, 3]", components=(3,)))
+
+
+def occupied_box(density: FloatArray) -> Box:
+    """The smallest box around the cells that are not zero; empty if all are."""
+    occupied = density != 0
+    lower, upper = [], []
+    for axis in range(3):
+        others = tuple(other for other in range(3) if other != axis)
+        cells = np.flatnonzero(occupied.any(axis=others))
+        if not len(cells):
+            return Box((0, 0, 0), (0, 0, 0))
+        lower.append(int(cells[0]))
+        upper.append(int(cells[-1]) + 1)
+    return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
+
+
+def _stored_velocity(path: Path, domain: Box, box: Box, staggered: bool) -> StoredVelocity:
+    values = read_npz_velocity(path)
+    if values.shape[:3] != domain.shape:
+        raise GridError(
+            f"{path}: velocity of {values.shape[:3]} cells (x, y, z), the density beside it has "
+            f"{domain.shape}"
+        )
+    whole = upper_grown(box)
+    inside = whole.intersection(domain)
+    result = np.zeros((*whole.shape, 3), np.float32)
+    stored = np.zeros(whole.shape, np.bool_)
+    result[inside.slices(whole)] = values[inside.slices(domain)]
+    stored[inside.slices(whole)] = True
+    return StoredVelocity(result, stored, (staggered, staggered, staggered))
+
+
+def _ours(path: Path, values: AnyArray) -> FloatArray:
+    """From `[z, y, x, ...]` to `[x, y, z, ...]`."""
+    values = values.transpose(2, 1, 0, *range(3, values.ndim))
+    return single_precision(np.ascontiguousarray(values), path, f"array {KEY!r}")
+
+
+def _read_array(path: Path, layout: str, components: tuple[int | None, ...]) -> AnyArray:
+    """The array of a file, after its header was found to be what is expected."""
+    path = existing_file(path)
+    with _npy_member(path) as (stream, size):
+        shape, _, dtype = _HEADERS[npy.read_magic(stream)](stream)
+        last = shape[3] if len(shape) == 4 else None
+        if len(shape) not in (3, 4) or last not in components or dtype.kind != "f":
+            raise FileFormatError(
+                f"{path}: expected floats {layout} under {KEY!r}, found {dtype} {list(shape)}"
+            )
+        count = int(np.prod(shape, dtype=object))
+        if min(shape) < 1 or count > MAX_VALUES:
+            raise FileFormatError(f"{path}: an array of {count} values is empty or too large")
+        if stream.tell() + count * dtype.itemsize != size:
+            raise FileFormatError(
+                f"{path}: truncated or corrupt: the header promises "
+                f"{count * dtype.itemsize} bytes, there are {size - stream.tell()}"
+            )
+        stream.seek(0)
+        return npy.read_array(stream, allow_pickle=False)
+
+
+@contextmanager
+def _npy_member(path: Path) -> Iterator[tuple[IO[bytes], int]]:
+    """The array file under `KEY`, and its size in bytes."""
+    name = f"{KEY}.npy"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if name not in archive.namelist():
+                keys = ", ".join(n.removesuffix(".npy") for n in archive.namelist()) or "nothing"
+                raise FileFormatError(f"{path}: no array {KEY!r}; the file holds {keys}")
+            with archive.open(name) as stream:
+                yield stream, archive.getinfo(name).file_size
+    except (
+        OSError,
+        EOFError,
+        KeyError,
+        ValueError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        reason = " ".join(str(error).split())
+        raise FileFormatError(f"{path}: not a readable npz file ({reason})") from error

@@ -1,0 +1,167 @@
+"""Smoke in and out: a frame's density and velocity, whatever file holds them.
+
+The format is chosen by suffix; a new one needs a `Reader` here and an axis in `UP_AXES`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from vnca.errors import FileFormatError, GridError, OptionError, SequenceError
+from vnca.files import existing_file
+from vnca.io.npz import npz_smoke_box, read_npz_smoke
+from vnca.io.orientation import (
+    box_to_internal,
+    index_to_internal,
+    matrix_to_internal,
+    to_internal,
+)
+from vnca.io.painted import write_painted, write_smoke
+from vnca.io.sequence import Frame
+from vnca.io.smoke_format import SmokeFormat, StoredSmoke, StoredVelocity, up_axis_of
+from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_box
+from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
+from vnca.typing import AnyArray, Box, FloatArray
+from vnca.volume import Volume
+
+__all__ = [
+    "READERS",
+    "Reader",
+    "SmokeFormat",
+    "read_smoke",
+    "smoke_box",
+    "with_fitted_scale",
+    "write_painted",
+    "write_smoke",
+]
+
+# Velocity is continued this far beyond the cells that store it.
+EXTRAPOLATED_CELLS = 4
+# Advection of higher order undershoots a little; what is beyond this is no density.
+NEGATIVE_TOLERANCE = 0.1
+_FITTED_PAIRS = 3
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A file format that holds smoke.
+
+    Attributes:
+        read: Reads a frame in the axes of its file.
+        box: The cells that hold smoke, in the axes of the file.
+    """
+
+    read: Callable[[Path, SmokeFormat], StoredSmoke]
+    box: Callable[[Path, SmokeFormat], Box]
+
+
+READERS = {
+    ".vdb": Reader(read_vdb_smoke, vdb_smoke_box),
+    ".npz": Reader(read_npz_smoke, npz_smoke_box),
+}
+
+
+def read_smoke(path: Path, format: SmokeFormat, *, frame: int = 0) -> Volume:
+    """A frame over the box of its smoke, up along +z, velocity in cells per frame.
+
+    Velocity is continued a few cells beyond where it is stored, and zero farther away. Density a
+    little below zero is set to zero. A frame without smoke has arrays of no cells.
+
+    Args:
+        path: A `.vdb` file, or a `.npz` file in Mantaflow's layout.
+        format: How to read it; a scale to be fitted must have been, see `with_fitted_scale`.
+        frame: The frame's number.
+
+    Raises:
+        FileFormatError: If the file cannot be read.
+        GridError: If grids are missing, do not fit together, or hold values that are no smoke.
+        OptionError: If an option has no meaning.
+    """
+    stored = _reader(path).read(path, format)
+    up = up_axis_of(path, format)
+    velocity = None if stored.velocity is None else _velocity(stored.velocity, stored, format)
+    return Volume(
+        density=to_internal(_non_negative(stored.density, path), up),
+        velocity=None if velocity is None else to_internal(velocity, up, vectors=True),
+        origin=index_to_internal(stored.origin, up),
+        index_to_world=matrix_to_internal(stored.index_to_world, up),
+        frame=frame,
+    )
+
+
+def smoke_box(path: Path, format: SmokeFormat) -> Box:
+    """The box `read_smoke` would fill; quick where the file's headers tell.
+
+    Raises:
+        FileFormatError: If the file cannot be read.
+        GridError: If there is no density grid.
+    """
+    return box_to_internal(_reader(path).box(path, format), up_axis_of(path, format))
+
+
+def with_fitted_scale(format: SmokeFormat, frames: Sequence[Frame]) -> SmokeFormat:
+    """`format` with a number in place of `velocity_scale="fit"`; otherwise as it is.
+
+    The number is the median over a few pairs of neighbouring frames.
+
+    Raises:
+        SequenceError: If no two frames are neighbours.
+        GridError: If no pair has a fit.
+    """
+    if format.velocity_scale != "fit":
+        return format
+    pairs = [(a, b) for a, b in pairwise(frames) if b.number == a.number + 1]
+    if not pairs:
+        raise SequenceError("velocity_scale: fit needs two neighbouring frames; set a number")
+    unscaled = replace(format, velocity_scale=1.0)
+    scales, failure = [], None
+    for chosen in np.unique(np.linspace(0, len(pairs) - 1, _FITTED_PAIRS).round().astype(int)):
+        volumes = [read_smoke(path, unscaled, frame=number) for number, path in pairs[chosen]]
+        try:
+            scales.append(fit_velocity_scale(*volumes))
+        except GridError as error:
+            failure = error
+    if failure is not None and not scales:
+        raise failure
+    return replace(format, velocity_scale=median(scales))
+
+
+def _reader(path: Path) -> Reader:
+    path = existing_file(path)
+    try:
+        return READERS[path.suffix.lower()]
+    except KeyError:
+        raise FileFormatError(
+            f"{path}: expected a file of smoke ({', '.join(READERS)}), got {path.suffix or 'none'}"
+        ) from None
+
+
+def _non_negative(density: FloatArray, path: Path) -> FloatArray:
+    least, most = float(density.min(initial=0)), float(density.max(initial=0))
+    if least < -NEGATIVE_TOLERANCE * most:
+        raise GridError(
+            f"{path}: density goes from {least:g} to {most:g}; expected none below zero; "
+            "choose another grid with --density-grid"
+        )
+    return np.maximum(density, 0, out=density)
+
+
+def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat) -> FloatArray:
+    """Velocity at the centres of the density's cells, cells/frame, in the file's axes."""
+    if format.velocity_scale == "fit":
+        raise OptionError("velocity_scale: fit needs a sequence of frames; set a number")
+    matrix: AnyArray = format.velocity_scale * cells_per_frame(
+        format.velocity_units,
+        fps=format.fps,
+        time_scale=format.time_scale,
+        index_to_world=smoke.index_to_world,
+    )
+    if not np.isfinite(matrix).all():
+        raise OptionError(f"velocity_scale: expected a finite number, got {format.velocity_scale}")
+    values = centred(velocity.values, velocity.stored, velocity.staggered)
+    values, _ = extrapolated(values, velocity.stored[:-1, :-1, :-1], EXTRAPOLATED_CELLS)
+    return values if np.array_equal(matrix, np.eye(3)) else values @ matrix.T.astype(np.float32)

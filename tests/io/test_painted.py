@@ -1,0 +1,257 @@
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vnca.errors import OptionError, OutputError, ShapeError
+from vnca.io.painted import write_painted, write_smoke
+from vnca.io.sequence import find_frames
+from vnca.io.smoke import read_smoke, with_fitted_scale
+from vnca.io.smoke_format import SmokeFormat
+from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
+from vnca.typing import AnyArray, Box, FloatArray
+from vnca.volume import Volume
+
+PLAIN = SmokeFormat()
+SHAPE = (9, 5, 6)
+ORIGIN = (-4, 3, 7)
+SHARED = Path(os.environ.get("VNCA_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
+CACHE = SHARED / "smoke" / "plume_sphere"
+needs_cache = pytest.mark.skipif(not CACHE.is_dir(), reason="no shared data")
+
+
+def random(*shape: int, seed: int = 0) -> FloatArray:
+    return np.random.default_rng(seed).random(shape, np.float32) + np.float32(0.25)
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    """Density in half floats in an irregular shape, and other grids."""
+    active = random(*SHAPE, seed=1) > 0.6
+    active[0, 0, 0] = active[-1, -1, -1] = True
+    transform = Transform.uniform(0.25, (1, 2, 3))
+
+    def grid(name: str, values: AnyArray, **options: bool) -> Grid:
+        extra = {"note": f"of {name}"}
+        return Grid.from_dense(
+            name, values, active, ORIGIN, transform=transform, metadata=extra, **options
+        )
+
+    grids = [
+        grid("heat", random(*SHAPE, seed=2)),
+        grid("density", random(*SHAPE, seed=3), half=True),
+        grid("Cd", random(*SHAPE, 3, seed=4)),
+        grid("velocity", random(*SHAPE, 3, seed=5)),
+    ]
+    write_vdb(tmp_path / "source.vdb", grids, metadata={"scene": "test"})
+    return tmp_path / "source.vdb"
+
+
+def painting(volume: Volume) -> tuple[FloatArray, FloatArray]:
+    """Density doubled, and the colour of each cell tells where it is."""
+    position = np.stack(np.indices(volume.density.shape), axis=-1) + volume.origin
+    return volume.density * 2, (position / 64).astype(np.float32)
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_a_painted_file_has_new_density_and_colour_and_all_the_rest(
+    source: Path, tmp_path: Path, up: str
+) -> None:
+    form = SmokeFormat(up_axis="y" if up == "y" else "z")
+    volume = read_smoke(source, form)
+    density, colour = painting(volume)
+    target = tmp_path / "out" / "painted.vdb"
+    write_painted(target, source, form, density=density, colour=colour, box=volume.box)
+    painted = read_smoke(target, form)
+    np.testing.assert_allclose(painted.density, density, rtol=1e-3)
+    np.testing.assert_array_equal(painted.index_to_world, volume.index_to_world)
+    with open_vdb(source) as before, open_vdb(target) as after:
+        assert after.names == ("heat", "density", "velocity", "Cd")
+        assert after.metadata.value("scene") == "test"
+        for name in ("heat", "velocity"):
+            np.testing.assert_array_equal(
+                after.read(name).tree.leaf_values, before.read(name).tree.leaf_values
+            )
+        old, new, cd = before.read("density"), after.read("density"), after.read("Cd")
+        for grid in (new, cd):
+            assert grid.is_half
+            assert grid.transform == old.transform
+            assert grid.metadata.value("note") == "of density"
+            np.testing.assert_array_equal(grid.tree.leaf_active, old.tree.leaf_active)
+            np.testing.assert_array_equal(grid.tree.leaf_origins, old.tree.leaf_origins)
+        values, active = cd.to_dense(Box(ORIGIN, (5, 8, 13)))
+        cell = (2, 4, 1)
+        assert active[cell]
+        x, y, z = (start + step for start, step in zip(ORIGIN, cell, strict=True))
+        ours = (z, x, y) if up == "y" else (x, y, z)
+        np.testing.assert_allclose(values[cell], np.array(ours) / 64, rtol=1e-3)
+
+
+def test_colour_can_have_other_names_and_a_larger_box(source: Path, tmp_path: Path) -> None:
+    volume = read_smoke(source, PLAIN)
+    density, colour = painting(volume)
+    box = volume.box.grown(2)
+    target = tmp_path / "painted.vdb"
+    write_painted(
+        target,
+        source,
+        PLAIN,
+        density=np.pad(density, 2, constant_values=9),
+        colour=np.pad(colour, [(2, 2)] * 3 + [(0, 0)], constant_values=9),
+        box=box,
+        colour_grids=("color", "paint"),
+    )
+    with open_vdb(target) as file:
+        assert file.names == ("heat", "density", "Cd", "velocity", "color", "paint")
+        for name in ("color", "paint"):
+            values, active = file.read(name).to_dense(box)
+            np.testing.assert_allclose(
+                values[2:-2, 2:-2, 2:-2][active[2:-2, 2:-2, 2:-2]],
+                colour[active[2:-2, 2:-2, 2:-2]],
+                rtol=1e-3,
+            )
+            assert values.max() < 9
+
+
+def test_density_beyond_half_floats_does_not_become_infinite(source: Path, tmp_path: Path) -> None:
+    volume = read_smoke(source, PLAIN)
+    density, colour = painting(volume)
+    target = tmp_path / "painted.vdb"
+    write_painted(target, source, PLAIN, density=density * 1e6, colour=colour, box=volume.box)
+    assert read_smoke(target, PLAIN).density.max() == 65504
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.int32, np.bool_])
+def test_painted_density_is_never_cut_to_whole_numbers(tmp_path: Path, dtype: type) -> None:
+    source, target = tmp_path / "source.vdb", tmp_path / "painted.vdb"
+    values = np.ones((3, 3, 3), dtype)
+    active, transform = np.ones((3, 3, 3), np.bool_), Transform.uniform(1)
+    write_vdb(source, [Grid.from_dense("density", values, active, (0, 0, 0), transform=transform)])
+    density, colour = random(3, 3, 3), random(3, 3, 3, 3)
+    box = Box((0, 0, 0), (3, 3, 3))
+    write_painted(target, source, PLAIN, density=density, colour=colour, box=box)
+    np.testing.assert_array_equal(read_smoke(target, PLAIN).density, density)
+    with open_vdb(target) as file:
+        assert file.grids["density"].value_type == ("double" if dtype is np.float64 else "float")
+        assert file.grids["Cd"].value_type == "vec3s"
+
+
+def test_a_frame_without_smoke_passes_through(tmp_path: Path) -> None:
+    source, target = tmp_path / "source.vdb", tmp_path / "painted.vdb"
+    empty = Volume(np.zeros(SHAPE, np.float32), random(*SHAPE, 3), ORIGIN, np.eye(4), 3)
+    write_smoke(source, empty)
+    volume = read_smoke(source, PLAIN)
+    assert volume.box.is_empty
+    density, colour = painting(volume)
+    write_painted(target, source, PLAIN, density=density, colour=colour, box=volume.box)
+    with open_vdb(target) as file:
+        assert file.names == ("density", "velocity", "Cd")
+        assert file.read("Cd").active_voxels == 0
+
+
+def test_what_does_not_fit_is_refused_and_leaves_no_file(source: Path, tmp_path: Path) -> None:
+    volume = read_smoke(source, PLAIN)
+    density, colour = painting(volume)
+    target = tmp_path / "painted.vdb"
+    smaller = Box(volume.box.lower, (4, 8, 13))
+    with pytest.raises(ShapeError, match="do not fit"):
+        write_painted(target, source, PLAIN, density=density, colour=colour, box=smaller)
+    with pytest.raises(ShapeError, match=r"source\.vdb: smoke in .* was painted"):
+        write_painted(target, source, PLAIN, density=density[:-1], colour=colour[:-1], box=smaller)
+    for names in (("density",), ("Cd", "Cd")):
+        with pytest.raises(OptionError, match="colour_grids: expected names of their own"):
+            write_painted(
+                target,
+                source,
+                PLAIN,
+                density=density,
+                colour=colour,
+                box=volume.box,
+                colour_grids=names,
+            )
+    with pytest.raises(OutputError, match=r"smoke is written as \.vdb, not \.npz"):
+        write_painted(
+            tmp_path / "a.npz", source, PLAIN, density=density, colour=colour, box=volume.box
+        )
+    assert [file.name for file in tmp_path.iterdir()] == ["source.vdb"]
+
+
+def test_mantaflow_frames_become_vdb_files_with_their_velocity(tmp_path: Path) -> None:
+    density = np.zeros((6, 7, 8), np.float32)  # z, y, x
+    density[1:5, 2:6, 3:7] = random(4, 4, 4)
+    density[2, 3, 4] = 0
+    for name, array in (("d", density), ("v", random(6, 7, 8, 3, seed=9))):
+        (tmp_path / name).mkdir()
+        np.savez_compressed(tmp_path / name / "001.npz", x=array)
+    source = tmp_path / "d" / "001.npz"
+    volume = read_smoke(source, PLAIN)
+    painted_density, colour = painting(volume)
+    target = tmp_path / "painted.vdb"
+    write_painted(target, source, PLAIN, density=painted_density, colour=colour, box=volume.box)
+    y_up = SmokeFormat(up_axis="y")
+    painted = read_smoke(target, y_up)
+    assert painted.box == volume.box
+    np.testing.assert_array_equal(painted.density, painted_density)
+    np.testing.assert_array_equal(painted.velocity, volume.velocity)
+    with open_vdb(target) as file:
+        assert file.names == ("density", "Cd", "velocity")
+        assert file.read("Cd").active_voxels == 63
+        assert file.grids["velocity"].grid_class == "staggered"
+
+
+def test_a_simulated_volume_is_read_back_by_default_options(tmp_path: Path) -> None:
+    density = np.where(random(*SHAPE) > 0.7, random(*SHAPE, seed=1), 0).astype(np.float32)
+    density[0, 0, 0] = density[-1, -1, -1] = 0.5
+    matrix = np.diag([0.1, 0.1, 0.1, 1.0])
+    volume = Volume(density, random(*SHAPE, 3, seed=2) - 0.5, ORIGIN, matrix, 4)
+    write_smoke(tmp_path / "s.vdb", volume)
+    again = read_smoke(tmp_path / "s.vdb", PLAIN, frame=4)
+    np.testing.assert_array_equal(again.density, density)
+    assert volume.velocity is not None
+    assert again.velocity is not None
+    np.testing.assert_array_equal(again.velocity[density > 0], volume.velocity[density > 0])
+    np.testing.assert_array_equal(again.index_to_world, matrix)
+    assert (again.origin, again.frame) == (ORIGIN, 4)
+    with open_vdb(tmp_path / "s.vdb") as file:
+        assert file.grids["velocity"].metadata.value("velocity_units") == "cells/frame"
+        assert file.grids["density"].grid_class == "fog volume"
+    write_smoke(tmp_path / "still.vdb", replace(volume, velocity=None))
+    assert read_smoke(tmp_path / "still.vdb", PLAIN).velocity is None
+    with pytest.raises(OutputError, match="without suffix"):
+        write_smoke(tmp_path / "s", volume)
+
+
+BLENDER = SmokeFormat(velocity_units="mantaflow", fps=24, time_scale=0.4)
+
+
+@needs_cache
+def test_blender_caches_are_painted_without_loss(tmp_path: Path) -> None:
+    path = find_frames(CACHE, "45")[0].path
+    volume = read_smoke(path, BLENDER, frame=45)
+    assert volume.box == Box((3, 1, 2), (63, 62, 77))
+    assert volume.velocity is not None
+    assert 3 < np.abs(volume.velocity).max() < 6
+    density, colour = painting(volume)
+    target = tmp_path / "painted.vdb"
+    write_painted(target, path, BLENDER, density=density, colour=colour, box=volume.box)
+    painted = read_smoke(target, BLENDER, frame=45)
+    # Halves doubled are halves.
+    np.testing.assert_array_equal(painted.density, density)
+    np.testing.assert_array_equal(painted.velocity, volume.velocity)
+    with open_vdb(path) as before, open_vdb(target) as after:
+        assert after.names == (*before.names, "Cd")
+        for name in before.names:
+            assert after.grids[name].transform == before.grids[name].transform
+            assert after.grids[name].metadata.value("file_base_resolution") == (64, 64, 96)
+            assert after.read(name).active_voxels == before.read(name).active_voxels
+
+
+@needs_cache
+def test_blender_velocity_is_a_fifth_too_fast() -> None:
+    fitted = with_fitted_scale(
+        replace(BLENDER, velocity_scale="fit"), find_frames(CACHE, "33,34,45,46")
+    )
+    assert isinstance(fitted.velocity_scale, float)
+    assert 0.77 < fitted.velocity_scale < 0.87
