@@ -48,6 +48,8 @@ def matrix_to_internal(index_to_world: AnyArray, up: UpAxis) -> AnyArray:
 
 
 def _turned(array: AnyArray, order: Index, vectors: bool) -> AnyArray:
+    if order == (0, 1, 2):
+        return np.ascontiguousarray(array)
     array = array.transpose(*order, *range(3, array.ndim))
     return np.ascontiguousarray(array[..., order] if vectors else array)
 

@@ -163,5 +163,8 @@ def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat)
     if not np.isfinite(matrix).all():
         raise OptionError(f"velocity_scale: expected a finite number, got {format.velocity_scale}")
     values = centred(velocity.values, velocity.stored, velocity.staggered)
-    values, _ = extrapolated(values, velocity.stored[:-1, :-1, :-1], EXTRAPOLATED_CELLS)
-    return values if np.array_equal(matrix, np.eye(3)) else values @ matrix.T.astype(np.float32)
+    known = velocity.stored[:-1, :-1, :-1]
+    if not np.array_equal(matrix, np.eye(3)):
+        values[known] = values[known] @ matrix.T.astype(np.float32)
+    values, _ = extrapolated(values, known, EXTRAPOLATED_CELLS)
+    return values

@@ -1,5 +1,6 @@
 """Velocity as files have it, made into cells per frame at cell centres in and near the smoke."""
 
+from itertools import product
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -38,14 +39,18 @@ def centred(
     Returns:
         `[x - 1, y - 1, z - 1, 3]`, zero where nothing is stored.
     """
-    inner = (slice(None, -1),) * 3
-    result = np.where(stored[inner][..., None], velocity[inner], np.float32(0))
+    x, y, z = (cells - 1 for cells in stored.shape)
+    result = np.zeros((x, y, z, 3), np.float32)
+    # Smoke fills a small part of its box: look at those cells only.
+    cells = np.nonzero(stored[:-1, :-1, :-1])
+    at_centres = velocity[cells]
     for axis in range(3):
         if staggered[axis]:
-            upper = tuple(slice(1, None) if a == axis else slice(None, -1) for a in range(3))
-            both = stored[inner] & stored[upper]
-            result[both, axis] += velocity[(*upper, axis)][both]
-            result[both, axis] *= 0.5
+            upper = tuple(index + (a == axis) for a, index in enumerate(cells))
+            is_there = stored[upper]
+            mean = 0.5 * (at_centres[:, axis] + velocity[(*upper, axis)])
+            at_centres[is_there, axis] = mean[is_there]
+    result[cells] = at_centres
     return result
 
 
@@ -65,26 +70,22 @@ def extrapolated(
     Returns:
         The velocity, zero where it is still unknown, and where it is known now.
     """
-    # A frame of cells that are never filled spares every question for the edge of the array.
-    values = np.pad(np.where(known[..., None], velocity, np.float32(0)), [(1, 1)] * 3 + [(0, 0)])
-    shape = values.shape[:3]
-    filled = np.pad(known, 1).ravel()
-    fillable = np.pad(~known, 1).ravel()
-    flat = values.reshape(-1, 3)
-    steps = np.array([shape[1] * shape[2], shape[2], 1])
-    steps = np.concatenate([steps, -steps])
-    edge = _rim(np.pad(known, 1)).ravel()
-    front = np.flatnonzero(edge & fillable)
+    result = np.zeros(velocity.shape, velocity.dtype)
+    result[known] = velocity[known]
+    filled = known.copy()
     for _ in range(layers):
-        neighbours = front[:, None] + steps
-        counted = filled[neighbours]
+        front = np.nonzero(_rim(filled) & ~filled)
         # In double precision the sum of up to six equal floats is exact.
-        sums = np.einsum("nkc,nk->nc", flat[neighbours], counted, dtype=np.float64)
-        flat[front] = sums / counted.sum(axis=1)[:, None]
-        filled[front], fillable[front] = True, False
-        front = np.unique(neighbours[fillable[neighbours]])
-    inner = (slice(1, -1),) * 3
-    return values[inner].copy(), filled.reshape(shape)[inner].copy()
+        total, count = np.zeros((len(front[0]), 3)), np.zeros(len(front[0]))
+        for axis, step in product(range(3), (-1, 1)):
+            # At the edge of the array a cell is its own neighbour: not filled, and zero.
+            place = list(front)
+            place[axis] = np.clip(front[axis] + step, 0, known.shape[axis] - 1)
+            total += result[tuple(place)]
+            count += filled[tuple(place)]
+        result[front] = total / count[:, None]
+        filled[front] = True
+    return result, filled
 
 
 def _rim(known: BoolArray) -> BoolArray:
