@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import tyro
 
 from vnca.automaton.model import MODEL_NAME, Model
@@ -70,7 +69,7 @@ def describe_vdb(path: Path) -> list[str]:
         lines = [f"OpenVDB file, {len(file.grids)} grids"]
         for header in file.grids.values():
             lines += _describe_grid(header)
-        lines += [f"  {name} = {value}" for name, value in file.metadata.items()]
+        lines += [f"  {name} = {entry.value}" for name, entry in file.metadata.items()]
     return lines
 
 
@@ -79,8 +78,7 @@ def _describe_grid(header: GridHeader) -> list[str]:
     extent = "box not in the header"
     if box is not None:
         extent = "empty" if box.is_empty else f"{box.lower} to {box.upper}"
-    columns = np.asarray(header.transform.index_to_world)[:3, :3]
-    sizes = ", ".join(f"{size:.6g}" for size in np.linalg.norm(columns, axis=0))
+    sizes = ", ".join(f"{size:.6g}" for size in header.transform.voxel_size)
     half = " saved as half" if header.is_half else ""
     return [
         f"  {header.name}: {header.value_type}{half}, {header.grid_class}, {extent}, voxel {sizes}"

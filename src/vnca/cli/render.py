@@ -16,9 +16,10 @@ from vnca.cli.progress import tracked
 from vnca.cli.sequence import open_sequence, sequence_box, volumes
 from vnca.errors import OptionError
 from vnca.io.image import write_image
+from vnca.io.painted import read_colour
 from vnca.io.sequence import FrameSequence
 from vnca.io.sheet import contact_sheet
-from vnca.io.smoke import SmokeFormat, read_colour
+from vnca.io.smoke import SmokeFormat
 from vnca.io.video import SUFFIXES as FILMS
 from vnca.render.brightness import gamma_for_opacity
 from vnca.typing import Box, FloatArray

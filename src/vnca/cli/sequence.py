@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 
 from vnca.cli.options import say
 from vnca.errors import SequenceError
 from vnca.io.sequence import FrameSequence, find_frames, format_frames
-from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box
+from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, with_fitted_scale
 from vnca.stylize.ahead import read_ahead
 from vnca.typing import Box
 from vnca.volume import Volume
@@ -22,6 +23,19 @@ def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
     if sequence.gaps:
         say(f"{pattern}: no file for frames {format_frames(sequence.gaps)}; going on without")
     return sequence
+
+
+def beside(path: Path, smoke: SmokeFormat) -> SmokeFormat:
+    """`smoke` with its velocity scale, where it is to be fitted, from a frame and its neighbours.
+
+    Raises:
+        SequenceError: If there is no neighbour to fit to.
+    """
+    if smoke.velocity_scale != "fit":
+        return smoke
+    frames = find_frames(path.parent)
+    at = [frame.path for frame in frames].index(path)
+    return with_fitted_scale(smoke, frames[max(0, at - 1) : at + 2])
 
 
 def sequence_box(sequence: FrameSequence, smoke: SmokeFormat) -> Box:

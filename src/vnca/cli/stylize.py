@@ -16,7 +16,7 @@ from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.sequence import open_sequence, sequence_box, volumes
 from vnca.errors import OptionError
-from vnca.io.smoke import SmokeFormat, write_painted
+from vnca.io.smoke import SmokeFormat, with_fitted_scale, write_painted
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.roll import stylize
 
@@ -81,9 +81,10 @@ def paint(options: Stylize) -> None:
     sequence = open_sequence(options.sequence, options.frames)
     if any(f.path.resolve().parent == options.out.resolve() for f in sequence):
         raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
-    box = sequence_box(sequence, options.smoke)
+    smoke = with_fitted_scale(options.smoke, sequence)
+    box = sequence_box(sequence, smoke)
     paintings = stylize(
-        volumes(sequence, options.smoke),
+        volumes(sequence, smoke),
         rule,
         stepper(rule, options.backend),
         options.config,

@@ -13,6 +13,7 @@ import tyro
 from vnca.automaton.model import Model
 from vnca.cli.options import chosen, parse, say
 from vnca.cli.progress import Progress
+from vnca.cli.sequence import beside
 from vnca.colour import linear_to_srgb
 from vnca.errors import OptionError
 from vnca.features.vgg import VGG16
@@ -72,7 +73,8 @@ def train(options: Train) -> Path:
     Raises:
         VncaError: If an input cannot be used or the run folder cannot be written.
     """
-    smoke = read_smoke(options.frame, options.smoke)
+    smoke_format = beside(options.frame, options.smoke)
+    smoke = read_smoke(options.frame, smoke_format)
     style = read_image(options.style)
     device = choose_device(options.device)
     torch.use_deterministic_algorithms(True)
@@ -88,7 +90,7 @@ def train(options: Train) -> Path:
         "features_origin": vgg.origin,
     }
     with RunFolder(options.out, overwrite=options.overwrite) as folder:
-        folder.start(options.config, {**training, "smoke": dataclasses.asdict(options.smoke)})
+        folder.start(options.config, {**training, "smoke": dataclasses.asdict(smoke_format)})
         say(
             f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
             f"features '{vgg.name}', {device}"

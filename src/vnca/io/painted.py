@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vnca.errors import OptionError, OutputError, ShapeError
+from vnca.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.io.npz import read_npz_smoke
-from vnca.io.orientation import box_to_file, to_file
+from vnca.io.orientation import box_to_file, to_file, to_internal
 from vnca.io.smoke_format import SmokeFormat, up_axis_of
 from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
@@ -100,6 +100,30 @@ def write_smoke(path: Path, volume: Volume) -> None:
             )
         )
     write_vdb(path, grids)
+
+
+def read_colour(path: Path, format: SmokeFormat, *, grid: str, box: Box) -> FloatArray | None:
+    """Linear RGB `[x, y, z, 3]` over `box`, in our axes, of a painted frame.
+
+    None where the file has no grid of that name; black where the grid has no value.
+
+    Raises:
+        FileFormatError: If the file cannot be read.
+        GridError: If the grid does not hold vectors of three.
+    """
+    if path.suffix.lower() != ".vdb":
+        return None
+    up = up_axis_of(path, format)
+    with open_vdb(path) as file:
+        if grid not in file.grids:
+            return None
+        header = file.grids[grid]
+        if not header.value_type.startswith("vec3"):
+            raise GridError(
+                f"{path}: grid '{grid}' holds {header.value_type}, not a colour; see --colour-grid"
+            )
+        values, _ = header.read().to_dense(box_to_file(box, up), fill=0)
+    return to_internal(values.astype(np.float32), up)
 
 
 class _Painting(NamedTuple):

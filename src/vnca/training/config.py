@@ -67,7 +67,7 @@ class TrainConfig:
     pool: PoolConfig = field(default_factory=PoolConfig)
     iterations: int = 300
     """Iterations of training."""
-    learning_rate: float = 1e-3
+    learning_rate: float = 3e-3
     """Adam's learning rate at the start."""
     milestones: tuple[float, ...] = (0.6, 0.85)
     """Parts of the iterations after which the learning rate falls."""
@@ -79,7 +79,7 @@ class TrainConfig:
     """Most steps of the automaton in an iteration."""
     overflow: float = 100.0
     """Weight of the penalty on states beyond ±1."""
-    reach: int = 2
+    reach: int = 1
     """Cells live up to this far from the smoke."""
     features: str = "edges"
     """Weights of VGG16: edges, imagenet or a path."""
@@ -102,15 +102,18 @@ class TrainConfig:
             raise OptionError("--reach and --overflow must not be negative")
 
 
+# A cell that knows where it is paints one frame well; one that does not paints any.
+_ANYWHERE = RuleConfig(position_prior=False)
+
 PRESETS = {
-    "draft": TrainConfig(),
+    "draft": TrainConfig(rule=_ANYWHERE),
     "standard": TrainConfig(
-        iterations=2000,
-        learning_rate=1e-3,
+        iterations=3000,
+        learning_rate=2e-3,
         longest_rollout=48,
         view=ViewConfig(size=192),
         pool=PoolConfig(size=128),
-        rule=RuleConfig(hidden=128),
+        rule=dataclasses.replace(_ANYWHERE, hidden=128),
     ),
     "paper": TrainConfig(
         iterations=5000,
@@ -120,7 +123,7 @@ PRESETS = {
         view=ViewConfig(size=256, elevation=0.0, mode="paper"),
         pool=PoolConfig(size=256),
         rule=RuleConfig(hidden=128),
-        appearance=dataclasses.replace(AppearanceConfig(), pixels=0.0),
+        appearance=AppearanceConfig(pixels=0.0),
     ),
 }
 """Training by name: `draft` in minutes on two cores, `standard` overnight or on a GPU, `paper` as
