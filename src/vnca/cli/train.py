@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 import torch
 import tyro
 
@@ -14,15 +13,14 @@ from vnca.automaton.model import Model
 from vnca.cli.options import chosen, parse, say
 from vnca.cli.progress import Progress
 from vnca.cli.sequence import beside
-from vnca.colour import linear_to_srgb
 from vnca.errors import OptionError
 from vnca.features.vgg import VGG16
-from vnca.io.image import read_image, resize
+from vnca.io.image import read_image, resize, to_srgb8
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.loop import Trainer
 from vnca.training.preview import preview_sheet
-from vnca.training.run import RunFolder, thumbnail
+from vnca.training.run import RunFolder
 from vnca.typing import FloatArray
 
 THUMBNAIL = 96
@@ -128,7 +126,7 @@ def _small(style: FloatArray) -> Any:
     rows, columns = style.shape[:2]
     factor = min(1.0, THUMBNAIL / max(rows, columns))
     size = max(1, round(rows * factor)), max(1, round(columns * factor))
-    return thumbnail(np.asarray(linear_to_srgb(resize(style, *size))))
+    return to_srgb8(resize(style, *size))
 
 
 def choose_device(name: str) -> torch.device:

@@ -12,10 +12,10 @@ import vnca
 from vnca.automaton.model import MODEL_NAME, Model
 from vnca.errors import OutputError
 from vnca.files import whole_file
-from vnca.io.image import write_image
+from vnca.io.image import to_srgb8, write_image
 from vnca.training.config import TrainConfig
 from vnca.training.loop import Progress
-from vnca.typing import AnyArray, FloatArray
+from vnca.typing import FloatArray
 
 CONFIG_NAME = "config.json"
 
@@ -83,6 +83,7 @@ class RunFolder:
         """Write a preview picture, linear RGB `[r, c, 3]`, and show it in TensorBoard."""
         path = self.path / f"preview_{iteration:06d}.png"
         write_image(path, picture)
+        self._events.add_image("preview", to_srgb8(picture), iteration, dataformats="HWC")
         return path
 
     def save(self, model: Model) -> Path:
@@ -90,8 +91,3 @@ class RunFolder:
         path = self.path / MODEL_NAME
         model.save(path)
         return path
-
-
-def thumbnail(srgb: AnyArray) -> AnyArray:
-    """An 8-bit picture `[r, c, 3]` of sRGB in [0, 1], for the model file."""
-    return (srgb.clip(0, 1) * 255 + 0.5).astype("uint8")
