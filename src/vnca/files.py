@@ -44,6 +44,36 @@ def whole_file(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def writable_folder(path: Path) -> Path:
+    """`path`, if files can be put there as far as can be told; nothing is made yet.
+
+    For asking before long work, whose output would come too late to learn it.
+
+    Raises:
+        OutputError: If it is a file, lies in one, or may not be written.
+    """
+    path = Path(path)
+    there = next(f for f in (path.absolute(), *path.absolute().parents) if os.path.lexists(f))
+    if not there.is_dir():
+        raise OutputError(f"{path}: cannot be written ({there} is not a folder); choose another")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise OutputError(f"{path}: cannot be written (no permission in {there}); choose another")
+    return path
+
+
+def writable_file(path: Path) -> Path:
+    """`path`, if a file can be put there as far as can be told; nothing is made yet.
+
+    Raises:
+        OutputError: If it is a folder, or its folder cannot be written.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise OutputError(f"{path}: cannot be written (it is a folder); name a file")
+    writable_folder(path.parent)
+    return path
+
+
 def existing_file(path: Path) -> Path:
     """`path`, if it is a readable, non-empty file.
 

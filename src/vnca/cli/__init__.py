@@ -42,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if (error.name or "").startswith("vnca"):
             raise
         return _failed(f"'vnca {name}' needs {error.name}: pip install 'vnca[train]'")
+    except MemoryError as error:
+        return _failed(f"'vnca {name}' ran out of memory ({error}); give it less to hold at once")
     except KeyboardInterrupt:
         print(file=sys.stderr)
         return 130
@@ -52,7 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _failed(message: str) -> int:
-    print(f"vnca: {message}", file=sys.stderr)
+    # What a library says of a damaged file may have several lines.
+    print("vnca:", " ".join(message.split()), file=sys.stderr)
     return 2
 
 

@@ -57,6 +57,7 @@ def demonstrate(options: Demo) -> None:
     film, sheet = options.out / "demo.mp4", options.out / "demo.png"
     with as_file(files("vnca.data") / STYLE) as own:
         style = options.style or own
+        picture = read_image(style)
         write_simulation(Simulate("plume", smoke, resolution, frames, options.seed))
         trained = smoke / f"plume_{3 * frames // 4:04d}.vdb"
         train(
@@ -73,7 +74,7 @@ def demonstrate(options: Demo) -> None:
         paint(Stylize(run_folder, sequence, painted, frames=asked, preview=film))
         scales = Model.load(run_folder).rule.scales
         gamma = scales.gamma / scales.density
-        write_image(sheet, _sheet(read_image(style), painted, gamma))
+        write_image(sheet, _sheet(picture, painted, asked, gamma))
     minutes, seconds = divmod(round(time.monotonic() - start), 60)
     say(f"done in {minutes}:{seconds:02}")
     print(f"film:          {film}\ncontact sheet: {sheet}")
@@ -92,9 +93,9 @@ def _config(options: Demo) -> TrainConfig:
     )
 
 
-def _sheet(style: FloatArray, painted: Path, gamma: float) -> FloatArray:
+def _sheet(style: FloatArray, painted: Path, asked: str, gamma: float) -> FloatArray:
     """The middle of the style and four frames of the painting, side by side."""
     view = FilmConfig(rows=SHEET_SIZE, columns=SHEET_SIZE)
     options = Render(str(painted), out=Path(), gamma=gamma, film=view)
-    frames = strip(open_sequence(str(painted), None), options, 4)
+    frames = strip(open_sequence(str(painted), asked), options, 4)
     return contact_sheet([[fit(style, SHEET_SIZE, SHEET_SIZE), *frames]])

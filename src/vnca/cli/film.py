@@ -1,18 +1,24 @@
-"""Filming painted frames as they come."""
+"""Filming painted frames as they come; torch is needed once there is something to film."""
 
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 
 from vnca.camera import frame_box
 from vnca.colour import srgb_to_linear
 from vnca.errors import OptionError
+from vnca.files import writable_file
 from vnca.io.video import FilmWriter
-from vnca.render.view import View, render
 from vnca.typing import Box, FloatArray, Index
+
+if TYPE_CHECKING:
+    import torch
+
+    from vnca.render.view import View
 
 
 @dataclass(frozen=True)
@@ -39,10 +45,14 @@ class FilmConfig:
     def __post_init__(self) -> None:
         if self.rows < 16 or self.columns < 16:
             raise OptionError("--film.rows and --film.columns: at least 16 pixels are needed")
-        if self.fps <= 0:
-            raise OptionError(f"--film.fps {self.fps}: must be positive")
+        if not 0 < self.fps <= 1000:
+            raise OptionError(f"--film.fps {self.fps}: must be positive, at most 1000")
         if not 0 <= self.field_of_view < 120:
             raise OptionError(f"--film.field-of-view {self.field_of_view}: must be 0 to 120")
+        if not -90 <= self.elevation <= 90:
+            raise OptionError(f"--film.elevation {self.elevation}: must be -90 to 90 degrees")
+        if not (isfinite(self.azimuth) and isfinite(self.turn)):
+            raise OptionError("--film.azimuth and --film.turn: expected numbers of degrees")
         parse_colour(self.background)
 
 
@@ -56,7 +66,7 @@ class Film:
         box: Box,
         *,
         frames: int,
-        device: torch.device | str = "cpu",
+        device: "torch.device | str" = "cpu",
     ) -> None:
         """Open the film; it appears under its name when the context ends well.
 
@@ -66,9 +76,15 @@ class Film:
             box: What to keep in view, index coordinates.
             frames: How many will come, which sets the pace of a turning camera.
             device: Where to render.
+
+        Raises:
+            OptionError: If the path is no film, or the frame rate cannot work.
+            OutputError: If the film cannot be written.
         """
+        import vnca.render.view  # noqa: F401  A missing torch is best told before long work.
+
         self._config, self._box, self._frames, self._device = config, box, frames, device
-        self._writer = FilmWriter(path, fps=config.fps)
+        self._writer = FilmWriter(writable_file(path), fps=config.fps)
         self._shown = 0
 
     def __enter__(self) -> "Film":
@@ -117,9 +133,13 @@ def picture(
     box: Box,
     gamma: float,
     turned: float,
-    device: torch.device | str = "cpu",
-) -> View:
+    device: "torch.device | str" = "cpu",
+) -> "View":
     """The view of one frame by a camera framed on `box` that has turned by some degrees."""
+    import torch
+
+    from vnca.render.view import render
+
     lower = (np.asarray(box.lower) - origin - 0.5).tolist()
     upper = (np.asarray(box.upper) - origin - 0.5).tolist()
     camera = frame_box(
@@ -155,5 +175,5 @@ def parse_colour(text: str) -> list[float]:
     except ValueError:
         values = b""
     if len(values) != 3:
-        raise OptionError(f"background '{text}': expected a colour such as #101014")
+        raise OptionError(f"--film.background '{text}': expected a colour such as #101014")
     return srgb_to_linear(np.frombuffer(values, np.uint8) / 255).tolist()

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
@@ -18,7 +19,7 @@ from vnca.io.vdb import GridHeader, open_vdb
 class Info:
     """Describe an OpenVDB file, a model or a training run."""
 
-    path: tyro.conf.Positional[Path]
+    path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
     """A .vdb file, a .safetensors model, or the folder of a run."""
 
 

@@ -20,12 +20,13 @@ def parse(command: str, options: Callable[..., T], arguments: Sequence[str], **k
 
 def chosen(arguments: Sequence[str], option: str, default: str) -> str:
     """The value of an option that has to be known before the others can be read."""
-    for at, word in enumerate(arguments):
-        if word == option and at + 1 < len(arguments):
-            return arguments[at + 1]
-        if word.startswith(f"{option}="):
-            return word.partition("=")[2]
-    return default
+    value = default
+    for word, following in zip(arguments, [*arguments[1:], default], strict=True):
+        if word == option:
+            value = following
+        elif word.startswith(f"{option}="):
+            value = word.partition("=")[2]
+    return value
 
 
 def say(line: str) -> None:

@@ -4,6 +4,7 @@ import dataclasses
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,8 @@ from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.sequence import open_sequence, sequence_box, volumes
 from vnca.errors import OptionError
+from vnca.files import writable_file
+from vnca.io.image import SUFFIXES as PICTURES
 from vnca.io.image import write_image
 from vnca.io.painted import read_colour
 from vnca.io.sequence import FrameSequence
@@ -25,6 +28,8 @@ from vnca.render.brightness import gamma_for_opacity
 from vnca.typing import Box, FloatArray
 from vnca.volume import Volume
 
+TRANSPARENT = (".png", ".exr")
+"""Pictures that can go without a background."""
 OPACITY = 0.97
 """Opacity that γ is chosen for where none is given."""
 
@@ -33,7 +38,7 @@ OPACITY = 0.97
 class Render:
     """Make a film or a turntable of a sequence, painted or not, or a picture of each frame."""
 
-    sequence: tyro.conf.Positional[str]
+    sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SEQUENCE")]
     """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
     out: Path
     """A film (mp4, gif, webp), or a picture (png, exr); with #### in its name, one a frame."""
@@ -55,12 +60,19 @@ class Render:
     """The camera."""
 
     def __post_init__(self) -> None:
-        if self.gamma is not None and self.gamma <= 0:
+        if not (self.is_film or self.out.suffix.lower() in PICTURES):
+            raise OptionError(
+                f"--out {self.out}: expected a film ({', '.join(FILMS)}) or a picture "
+                f"({', '.join(PICTURES)})"
+            )
+        if self.gamma is not None and not 0 < self.gamma < inf:
             raise OptionError(f"--gamma {self.gamma}: must be positive")
         if self.turntable < 0:
             raise OptionError(f"--turntable {self.turntable}: must not be negative")
-        if self.transparent and self.is_film:
-            raise OptionError("--transparent: films have no transparency; write .png or .exr")
+        if self.transparent and self.out.suffix.lower() not in TRANSPARENT:
+            raise OptionError(
+                f"--transparent: {self.out} has no transparency; write {' or '.join(TRANSPARENT)}"
+            )
         if self.strip < 0 or (self.strip and self.is_film):
             raise OptionError(f"--strip {self.strip}: a number of frames, with a picture as --out")
         if self.turntable and not self.is_film:
@@ -84,6 +96,7 @@ def render_sequence(options: Render) -> None:
         VncaError: If an input cannot be used or the output cannot be written.
     """
     sequence = open_sequence(options.sequence, options.frames)
+    writable_file(options.out)
     if options.strip:
         write_image(options.out, contact_sheet([strip(sequence, options, options.strip)]))
         say(f"rendered: {options.out}")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from vnca.cli.options import say
 from vnca.errors import SequenceError
+from vnca.files import existing_file
 from vnca.io.sequence import FrameSequence, find_frames, format_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, with_fitted_scale
 from vnca.stylize.ahead import read_ahead
@@ -33,9 +34,14 @@ def beside(path: Path, smoke: SmokeFormat) -> SmokeFormat:
     """
     if smoke.velocity_scale != "fit":
         return smoke
-    frames = find_frames(path.parent)
-    at = [frame.path for frame in frames].index(path)
-    return with_fitted_scale(smoke, frames[max(0, at - 1) : at + 2])
+    frames = find_frames(existing_file(path).parent)
+    places = [at for at, frame in enumerate(frames) if frame.path == path]
+    if not places:
+        raise SequenceError(
+            f"{path}: not a numbered frame, so --velocity-scale fit has no neighbour to fit to; "
+            "set a number"
+        )
+    return with_fitted_scale(smoke, frames[max(0, places[0] - 1) : places[0] + 2])
 
 
 def sequence_box(sequence: FrameSequence, smoke: SmokeFormat) -> Box:
@@ -48,7 +54,10 @@ def sequence_box(sequence: FrameSequence, smoke: SmokeFormat) -> Box:
     for frame in sequence:
         box = box.union(smoke_box(frame.path, smoke))
     if box.is_empty:
-        raise SequenceError(f"{sequence[0].path.parent}: there is no smoke in any frame")
+        raise SequenceError(
+            f"{sequence[0].path.parent}: there is no smoke in any frame; "
+            "choose others with --frames or another grid with --density-grid"
+        )
     return box
 
 

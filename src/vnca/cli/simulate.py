@@ -10,6 +10,7 @@ import tyro
 from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
 from vnca.errors import OptionError
+from vnca.files import writable_folder
 from vnca.io.smoke import write_smoke
 from vnca.simulate.scenes import simulate
 
@@ -45,6 +46,7 @@ def write_simulation(options: Simulate) -> None:
     Raises:
         VncaError: If the scene cannot be simulated or the folder cannot be written.
     """
+    writable_folder(options.out)
     volumes = simulate(
         options.scene, resolution=options.resolution, frames=options.frames, seed=options.seed
     )

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -16,7 +17,9 @@ from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.sequence import open_sequence, sequence_box, volumes
 from vnca.errors import OptionError
+from vnca.files import writable_folder
 from vnca.io.smoke import SmokeFormat, with_fitted_scale, write_painted
+from vnca.io.video import SUFFIXES as FILMS
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.roll import stylize
 
@@ -25,9 +28,9 @@ from vnca.stylize.roll import stylize
 class Stylize:
     """Paint a smoke sequence with a trained rule."""
 
-    model: tyro.conf.Positional[Path]
+    model: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="MODEL")]
     """A model file, or the folder of a training run."""
-    sequence: tyro.conf.Positional[str]
+    sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SEQUENCE")]
     """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
     out: Path
     """Folder for the painted frames, which keep their names."""
@@ -53,10 +56,18 @@ class Stylize:
     def __post_init__(self) -> None:
         for name in ("gamma", "density_scale"):
             value = getattr(self, name)
-            if value is not None and value <= 0:
+            if value is not None and not 0 < value < inf:
                 raise OptionError(f"--{name.replace('_', '-')} {value}: must be positive")
+        if self.preview is not None and self.preview.suffix.lower() not in FILMS:
+            raise OptionError(f"--preview {self.preview}: expected a film ({', '.join(FILMS)})")
         if not self.colour_grid:
             raise OptionError("--colour-grid: at least one name is needed")
+        names = (self.smoke.density_grid, *self.colour_grid)
+        if len(set(names)) < len(names):
+            raise OptionError(
+                f"--colour-grid {' '.join(self.colour_grid)}: each needs a name of its own, not "
+                f"that of another or of the density ({self.smoke.density_grid})"
+            )
 
 
 def run(arguments: Sequence[str]) -> None:
@@ -79,6 +90,7 @@ def paint(options: Stylize) -> None:
     )
     rule = dataclasses.replace(model.rule, scales=scales)
     sequence = open_sequence(options.sequence, options.frames)
+    writable_folder(options.out)
     if any(f.path.resolve().parent == options.out.resolve() for f in sequence):
         raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
     smoke = with_fitted_scale(options.smoke, sequence)

@@ -13,7 +13,7 @@ from vnca.automaton.model import Model
 from vnca.cli.options import chosen, parse, say
 from vnca.cli.progress import Progress
 from vnca.cli.sequence import beside
-from vnca.errors import OptionError
+from vnca.errors import GridError, OptionError
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image, resize, to_srgb8
 from vnca.io.smoke import SmokeFormat, read_smoke
@@ -31,9 +31,9 @@ THUMBNAIL = 96
 class Train:
     """Learn a rule from one frame of smoke and one picture."""
 
-    frame: tyro.conf.Positional[Path]
+    frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
-    style: tyro.conf.Positional[Path]
+    style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
     """The picture: PNG, JPEG or WebP."""
     out: Path
     """Folder of the run: model, configuration, previews and loss curves."""
@@ -71,10 +71,15 @@ def train(options: Train) -> Path:
     Raises:
         VncaError: If an input cannot be used or the run folder cannot be written.
     """
-    smoke_format = beside(options.frame, options.smoke)
-    smoke = read_smoke(options.frame, smoke_format)
+    run_folder = RunFolder(options.out, overwrite=options.overwrite)
     style = read_image(options.style)
     device = choose_device(options.device)
+    smoke_format = beside(options.frame, options.smoke)
+    smoke = read_smoke(options.frame, smoke_format)
+    if not smoke.density.any():
+        raise GridError(
+            f"{options.frame}: there is no smoke in this frame to train on; choose a later one"
+        )
     torch.use_deterministic_algorithms(True)
     vgg = VGG16.load(options.config.features, device)
     trainer = Trainer(smoke, style, options.config, vgg, device=device)
@@ -87,7 +92,7 @@ def train(options: Train) -> Path:
         "features": vgg.name,
         "features_origin": vgg.origin,
     }
-    with RunFolder(options.out, overwrite=options.overwrite) as folder:
+    with run_folder as folder:
         folder.start(options.config, {**training, "smoke": dataclasses.asdict(smoke_format)})
         say(
             f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
@@ -142,4 +147,6 @@ def choose_device(name: str) -> torch.device:
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as error:
         raise OptionError(f"--device {name}: not available here; use auto or cpu") from error
+    if device.type not in ("cpu", "cuda"):
+        raise OptionError(f"--device {name}: expected auto, cpu or cuda")
     return device

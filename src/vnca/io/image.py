@@ -23,6 +23,8 @@ _ENCODERS: dict[str, tuple[str, dict[str, Any]]] = {
     ".jpeg": ("JPEG", {"quality": 92, "subsampling": 0}),
     ".webp": ("WEBP", {"quality": 92, "method": 4}),
 }
+SUFFIXES = (*_ENCODERS, ".exr")
+"""What `write_image` writes."""
 _LARGEST_HALF = 65504.0
 
 

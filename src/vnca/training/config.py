@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass, field
+from math import inf
 from typing import Annotated, Literal
 
 import tyro
@@ -33,11 +34,11 @@ class ViewConfig:
             raise OptionError(f"--view.size {self.size}: at least 32 pixels are needed")
         if not 0 <= self.elevation <= 90:
             raise OptionError(f"--view.elevation {self.elevation}: must be 0 to 90 degrees")
-        if self.step <= 0:
+        if not 0 < self.step < inf:
             raise OptionError(f"--view.step {self.step}: must be positive")
         if not 0 < self.opacity < 1:
             raise OptionError(f"--view.opacity {self.opacity}: must be between 0 and 1")
-        if self.gamma is not None and self.gamma <= 0:
+        if self.gamma is not None and not 0 < self.gamma < inf:
             raise OptionError(f"--view.gamma {self.gamma}: must be positive")
 
 
@@ -53,8 +54,8 @@ class PoolConfig:
     """A state with a value beyond this has exploded and is thrown away."""
 
     def __post_init__(self) -> None:
-        if self.size < 1 or self.reseed_every < 1 or self.limit <= 0:
-            raise OptionError("--pool: size, reseed-every and limit must be positive")
+        if self.size < 1 or self.reseed_every < 1 or not self.limit > 0:
+            raise OptionError("--pool.size, --pool.reseed-every and --pool.limit must be positive")
 
 
 @dataclass(frozen=True)
@@ -91,15 +92,22 @@ class TrainConfig:
     def __post_init__(self) -> None:
         if self.iterations < 1:
             raise OptionError(f"--iterations {self.iterations}: at least 1 is needed")
-        if self.learning_rate <= 0 or self.decay <= 0:
+        if not (0 < self.learning_rate < inf and 0 < self.decay < inf):
             raise OptionError("--learning-rate and --decay must be positive")
+        if not all(0 <= part <= 1 for part in self.milestones):
+            raise OptionError(
+                f"--milestones {' '.join(map(str, self.milestones))}: expected parts of the "
+                "iterations, from 0 to 1"
+            )
         if not 1 <= self.shortest_rollout <= self.longest_rollout:
             raise OptionError(
                 f"--shortest-rollout {self.shortest_rollout}: must be from 1 to "
                 f"--longest-rollout ({self.longest_rollout})"
             )
-        if self.reach < 0 or self.overflow < 0:
+        if self.reach < 0 or not 0 <= self.overflow < inf:
             raise OptionError("--reach and --overflow must not be negative")
+        if not 0 <= self.seed < 2**63:
+            raise OptionError(f"--seed {self.seed}: must be from 0 to 2^63 - 1")
 
 
 # A cell that knows where it is paints one frame well; one that does not paints any.

@@ -135,11 +135,11 @@ class Trainer:
         penalty = config.overflow * self._overflow(state[:-1])
         loss = appearance.total + penalty
         kept = self._pool.put(place, state)
+        self._optimiser.zero_grad()
         if bool(torch.isfinite(loss)):
-            self._optimiser.zero_grad()
             loss.backward()
-            self._normalise_gradients()
-            self._optimiser.step()
+        self._normalise_gradients()
+        self._optimiser.step()
         self._schedule.step()
         self.iteration += 1
         terms = {name: float(value.detach()) for name, value in appearance.terms.items()}
@@ -200,10 +200,14 @@ class Trainer:
         return overflow(cells) + overflow(2 * cells[:, : DENSITY_CHANGE + 1])
 
     def _normalise_gradients(self) -> None:
-        """Give each gradient unit length: rollouts of any length then teach equally much."""
+        """Give each gradient unit length: rollouts of any length then teach equally much.
+
+        One that is not finite is dropped, and its weight stays as it is in this iteration.
+        """
         for weight in self._weights:
             if weight.grad is not None:
-                weight.grad /= weight.grad.norm() + 1e-8
+                norm = weight.grad.norm()
+                weight.grad = weight.grad / (norm + 1e-8) if bool(norm.isfinite()) else None
 
 
 def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:

@@ -10,7 +10,7 @@ from vnca.training.config import PoolConfig
 
 
 class Pool:
-    """A fixed number of states with their ages in steps; all start from the seed."""
+    """A fixed number of states; all start from the seed."""
 
     def __init__(self, seed: Tensor, config: PoolConfig, random: np.random.Generator) -> None:
         """Fill the pool with `seed`, `[n + 1, C]`."""
@@ -18,10 +18,9 @@ class Pool:
         self._config = config
         self._random = random
         self._states: dict[int, Tensor] = {}  # those that are not the seed
-        self._drawn = 0
 
     def draw(self, iteration: int) -> tuple[int, Tensor]:
-        """A random place in the pool and its state; the seed again every so often."""
+        """A random place in the pool and its state; every so many iterations, the seed again."""
         place = int(self._random.integers(self._config.size))
         if iteration % self._config.reseed_every == 0:
             self._states.pop(place, None)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -11,43 +12,49 @@ import torch
 import vnca
 from vnca.automaton.model import MODEL_NAME, Model
 from vnca.errors import OutputError
-from vnca.files import whole_file
+from vnca.files import whole_file, writable_folder
 from vnca.io.image import to_srgb8, write_image
 from vnca.training.config import TrainConfig
 from vnca.training.loop import Progress
 from vnca.typing import FloatArray
 
 CONFIG_NAME = "config.json"
+_OF_ONE_RUN = ("events.out.tfevents.*", "preview_[0-9]*.png")
 
 
 class RunFolder:
-    """A run folder being written; closes its event file when used as a context manager."""
+    """A run folder, written to while it is a context."""
 
     def __init__(self, path: Path, *, overwrite: bool = False) -> None:
-        """Open a folder, made if needed.
+        """Choose a folder; nothing is written until the context begins.
 
         Raises:
             OutputError: If it cannot be written, or holds a model already and may not be
                 overwritten.
         """
-        from torch.utils.tensorboard.writer import SummaryWriter
-
-        self.path = Path(path)
+        self.path = writable_folder(path)
+        self._overwrite = overwrite
         if (self.path / MODEL_NAME).exists() and not overwrite:
             raise OutputError(
                 f"{self.path}: holds a trained model already; choose another --out or --overwrite"
             )
+
+    def __enter__(self) -> "RunFolder":
+        """The folder itself, made if needed, and cleared of an earlier run's curves and previews.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        from torch.utils.tensorboard.writer import SummaryWriter
+
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            if overwrite:
-                for old in self.path.glob("events.out.tfevents.*"):
+            if self._overwrite:
+                for old in chain.from_iterable(map(self.path.glob, _OF_ONE_RUN)):
                     old.unlink()
             self._events = SummaryWriter(str(self.path))
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
-
-    def __enter__(self) -> "RunFolder":
-        """The folder itself."""
         return self
 
     def __exit__(
