@@ -69,6 +69,7 @@ def test_paper_mode_is_the_printed_sum() -> None:
 @pytest.mark.parametrize(
     "call", [lambda d, c: composite(d, c, step=1.0), lambda d, c: paper_composite(d, c, gamma=1.0)]
 )
+@pytest.mark.usefixtures("unchecked_shapes")
 def test_colours_for_other_samples_are_refused(call) -> None:
     density, colour = random_rays()
     with pytest.raises(ShapeError, match="colour"):

@@ -231,6 +231,7 @@ def test_rendering_twice_gives_the_same_bits() -> None:
     ],
     ids=str,
 )
+@pytest.mark.usefixtures("unchecked_shapes")
 def test_impossible_options_are_refused(wrong) -> None:
     density = ball()
     options = {"rows": 4, "columns": 4, "gamma": 1.0} | wrong
@@ -238,6 +239,7 @@ def test_impossible_options_are_refused(wrong) -> None:
         render(density, white(density), camera_on(density.shape), **options)
 
 
+@pytest.mark.usefixtures("unchecked_shapes")
 def test_colour_of_other_cells_is_refused() -> None:
     density = ball()
     with pytest.raises(ShapeError, match="volume to render"):
