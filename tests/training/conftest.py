@@ -1,0 +1,38 @@
+"""A training small enough to run in a test."""
+
+from importlib.resources import files
+
+import pytest
+from PIL import Image
+
+from vnca.automaton.rule import RuleConfig
+from vnca.features.vgg import VGG16
+from vnca.io.image import fit, read_image
+from vnca.losses.appearance import AppearanceConfig
+from vnca.training.config import TrainConfig, ViewConfig
+from vnca.typing import FloatArray
+
+
+@pytest.fixture(scope="session")
+def vgg() -> VGG16:
+    return VGG16.load("edges")
+
+
+@pytest.fixture(scope="session")
+def style(tmp_path_factory: pytest.TempPathFactory) -> FloatArray:
+    path = tmp_path_factory.mktemp("style") / "style.png"
+    with Image.open(str(files("vnca.data") / "vangogh_cafe_terrace.webp")) as image:
+        image.convert("RGB").resize((64, 80)).save(path)
+    return fit(read_image(path), 48, 48)
+
+
+@pytest.fixture(scope="session")
+def tiny_config() -> TrainConfig:
+    return TrainConfig(
+        rule=RuleConfig(channels=6, hidden=16, position_prior=False),
+        view=ViewConfig(size=32),
+        appearance=AppearanceConfig(samples=128, layers=("relu1_1", "relu2_1", "relu3_1")),
+        iterations=3,
+        shortest_rollout=2,
+        longest_rollout=4,
+    )

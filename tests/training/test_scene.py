@@ -1,0 +1,103 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.errors import GridError
+from vnca.render.brightness import gamma_for_opacity
+from vnca.training.config import TrainConfig, ViewConfig
+from vnca.training.loop import choose_scales
+from vnca.training.scene import Scene, density_scale, smoke_bounds, velocity_scale
+from vnca.typing import Box
+from vnca.volume import Volume
+
+
+def scene(smoke: Volume, **scales: float) -> Scene:
+    rule = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(**scales), seed=0)
+    return Scene(smoke, rule, reach=1)
+
+
+def test_the_density_that_counts_as_one_ignores_empty_cells_and_a_few_bright_ones() -> None:
+    density = np.zeros((10, 10, 20), np.float32)
+    density[:, :, :10] = 2
+    density[0, 0, 0] = 1000
+    assert density_scale(density) == 2
+    assert density_scale(np.zeros((2, 2, 2), np.float32)) == 1
+
+
+def test_the_velocity_that_counts_as_one_is_the_rms_speed_in_the_smoke() -> None:
+    density = np.zeros((4, 4, 4), np.float32)
+    density[:2] = 1
+    velocity = np.zeros((4, 4, 4, 3), np.float32)
+    velocity[0] = (3, 0, 4)
+    velocity[3] = 100  # outside of the smoke
+    smoke = Volume(density, velocity, (0, 0, 0), np.eye(4), 1)
+    assert velocity_scale(smoke) == pytest.approx(5 / np.sqrt(2))
+    assert velocity_scale(replace(smoke, velocity=None)) == 1
+    assert velocity_scale(replace(smoke, velocity=0 * velocity)) > 0
+
+
+@pytest.mark.parametrize("opacity", [0.5, 0.97])
+def test_gamma_makes_smoke_as_opaque_as_asked(tiny_smoke: Volume, opacity: float) -> None:
+    gamma = gamma_for_opacity(tiny_smoke.density, opacity)
+    depths = np.concatenate([tiny_smoke.density.sum(axis).ravel() for axis in range(3)])
+    seen = 1 - np.exp(-gamma * depths[depths > 0.1 * depths.max()])
+    assert seen.mean() == pytest.approx(opacity, abs=1e-4)
+    assert gamma_for_opacity(0 * tiny_smoke.density, opacity) == 1
+
+
+def test_a_given_gamma_and_the_units_of_the_file_are_kept_apart(tiny_smoke: Volume) -> None:
+    config = TrainConfig(view=ViewConfig(gamma=0.25))
+    assert choose_scales(tiny_smoke, config).gamma == 0.25
+    bright = replace(tiny_smoke, density=50 * tiny_smoke.density)
+    plain, scaled = (choose_scales(s, TrainConfig()) for s in (tiny_smoke, bright))
+    assert scaled.density == pytest.approx(50 * plain.density)
+    assert scaled.gamma == pytest.approx(plain.gamma, rel=1e-4)
+
+
+def test_the_smoke_is_framed_by_the_cells_that_count(tiny_smoke: Volume) -> None:
+    assert smoke_bounds(tiny_smoke, 1.0) == Box((-2, 5, 8), (8, 15, 18))
+    faint = np.zeros((5, 5, 5), np.float32)
+    faint[0, 0, 0], faint[1, 2, 3] = 1e-3, 1
+    assert smoke_bounds(replace(tiny_smoke, density=faint, velocity=None), 1.0) == Box(
+        (-2, 6, 10), (-1, 7, 11)
+    )
+
+
+def test_a_frame_without_smoke_cannot_be_trained_on(tiny_smoke: Volume) -> None:
+    with pytest.raises(GridError, match="no smoke"):
+        scene(replace(tiny_smoke, density=0 * tiny_smoke.density))
+
+
+def test_a_state_of_zeros_looks_grey_and_as_dense_as_the_smoke(tiny_smoke: Volume) -> None:
+    there = scene(tiny_smoke, gamma=0.6)
+    view = there.look(there.seed(4), there.camera(30, 10), ViewConfig(size=32))
+    seen = view.opacity > 0.5
+    assert 0.3 < float(seen.float().mean()) < 0.9
+    grey = (view.colour / view.opacity[..., None])[seen]
+    torch.testing.assert_close(grey, torch.full_like(grey, 0.2140), atol=1e-3, rtol=0)
+
+
+def test_the_painting_shows_from_where_it_is_on_the_smoke(tiny_smoke: Volume) -> None:
+    """Left half red, seen from the front; red on the right, seen from the back."""
+    there = scene(tiny_smoke, gamma=5.0)
+    state = there.seed(4)
+    is_left = torch.from_numpy(there.domain.cells[:, 0] < 3)
+    state[:-1, 0] = torch.where(is_left, 0.5, -0.5)
+    for azimuth, red_side in ((0, 0), (180, 1)):
+        view = there.look(state, there.camera(azimuth, 0), ViewConfig(size=32))
+        halves = view.colour[..., 0].split(16, dim=1)
+        assert halves[red_side].mean() > 10 * halves[1 - red_side].mean()
+
+
+def test_a_look_is_differentiable_in_what_is_shown_only(tiny_smoke: Volume) -> None:
+    there = scene(tiny_smoke, gamma=0.5)
+    state = there.seed(6).requires_grad_()
+    view = there.look(state, there.camera(0, 0), ViewConfig(size=32))
+    view.over([0.1, 0.2, 0.3]).sum().backward()
+    assert state.grad is not None
+    moved = state.grad.abs().sum(0)
+    assert bool((moved[:4] > 0).all())
+    assert not moved[4:].any()
