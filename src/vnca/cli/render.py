@@ -24,14 +24,14 @@ from vnca.io.sequence import FrameSequence
 from vnca.io.sheet import contact_sheet
 from vnca.io.smoke import SmokeFormat
 from vnca.io.video import SUFFIXES as FILMS
-from vnca.render.brightness import gamma_for_opacity
+from vnca.render.brightness import gamma_for_cell_opacity
 from vnca.typing import Box, FloatArray
 from vnca.volume import Volume
 
 TRANSPARENT = (".png", ".exr")
 """Pictures that can go without a background."""
-OPACITY = 0.97
-"""Opacity that γ is chosen for where none is given."""
+CELL_OPACITY = {"painted": 0.95, "unpainted": 0.15}
+"""Opacity of a cell of typical smoke that γ is chosen for where none is given."""
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,10 @@ class _Shown:
 def _frames(sequence: FrameSequence, options: Render) -> Iterator[_Shown]:
     gamma = options.gamma
     for frame, smoke in zip(sequence, volumes(sequence, options.smoke), strict=True):
-        if gamma is None and smoke.density.size:
-            gamma = gamma_for_opacity(smoke.density, OPACITY)
         colour = read_colour(frame.path, options.smoke, grid=options.colour_grid, box=smoke.box)
+        if gamma is None and smoke.density.size:
+            opacity = CELL_OPACITY["unpainted" if colour is None else "painted"]
+            gamma = gamma_for_cell_opacity(smoke.density, opacity)
         if colour is None:
             colour = np.ones((*smoke.density.shape, 3), dtype=np.float32)
         yield _Shown(smoke, colour, gamma or 1.0)

@@ -5,25 +5,21 @@ import numpy as np
 from vnca.typing import AnyArray
 
 
-def gamma_for_opacity(density: AnyArray, opacity: float) -> float:
-    """Extinction γ of density 1, 1/cell, at which the smoke has the given mean opacity.
+def gamma_for_cell_opacity(density: AnyArray, opacity: float) -> float:
+    """Extinction γ of density 1, 1/cell, at which one cell of typical smoke has an opacity.
 
-    Seen along each axis in turn; the mean is over the pixels whose optical depth is at least a
-    tenth of the deepest, so that faint fringes do not count. 1 where there is no smoke.
+    Typical is the density met by a random particle of smoke: the mean of d weighted by d. 1 where
+    there is no smoke.
+
+    Near 1 a view shows the surface of the smoke, and a texture as fine as its cells; a low
+    opacity mixes the colours of many cells along each ray.
 
     Args:
-        density: `[x, y, z]`, non-negative.
-        opacity: Mean opacity wanted, in (0, 1).
+        density: Any shape, non-negative.
+        opacity: In (0, 1).
     """
-    if density.size == 0 or not density.max() > 0:
+    total = density.sum(dtype=np.float64)
+    if not total > 0:
         return 1.0
-    depths = [density.sum(axis=axis, dtype=np.float64).ravel() for axis in range(3)]
-    depth = np.concatenate([d[d > 0.1 * d.max()] for d in depths])
-    low, high = 1e-6, 1e6
-    for _ in range(60):  # halvings of the logarithm: far below float32's resolution
-        middle = np.sqrt(low * high)
-        if np.mean(-np.expm1(-middle * depth)) < opacity:
-            low = middle
-        else:
-            high = middle
-    return float(high)
+    typical = np.square(density, dtype=np.float64).sum() / total
+    return float(-np.log1p(-opacity) / typical)

@@ -24,8 +24,9 @@ class ViewConfig:
     """Distance between samples along a ray, cells."""
     mode: Literal["sane", "paper"] = "sane"
     """Integrand: emission and absorption, or the paper's as printed."""
-    opacity: float = 0.97
-    """Without a given gamma, one is chosen that makes the smoke this opaque, seen from afar."""
+    cell_opacity: float = 0.95
+    """Without a given gamma, one is chosen that makes a typical cell this opaque: high shows the
+    texture of the surface, low mixes many cells along a ray."""
     gamma: float | None = None
     """Extinction of density 1, per cell; chosen from the frame unless given."""
 
@@ -36,8 +37,8 @@ class ViewConfig:
             raise OptionError(f"--view.elevation {self.elevation}: must be 0 to 90 degrees")
         if not 0 < self.step < inf:
             raise OptionError(f"--view.step {self.step}: must be positive")
-        if not 0 < self.opacity < 1:
-            raise OptionError(f"--view.opacity {self.opacity}: must be between 0 and 1")
+        if not 0 < self.cell_opacity < 1:
+            raise OptionError(f"--view.cell-opacity {self.cell_opacity}: must be between 0 and 1")
         if self.gamma is not None and not 0 < self.gamma < inf:
             raise OptionError(f"--view.gamma {self.gamma}: must be positive")
 
@@ -66,7 +67,7 @@ class TrainConfig:
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     pool: PoolConfig = field(default_factory=PoolConfig)
-    iterations: int = 300
+    iterations: int = 400
     """Iterations of training."""
     learning_rate: float = 3e-3
     """Adam's learning rate at the start."""
@@ -74,9 +75,9 @@ class TrainConfig:
     """Parts of the iterations after which the learning rate falls."""
     decay: float = 0.4
     """What the learning rate is multiplied by at a milestone."""
-    shortest_rollout: int = 12
+    shortest_rollout: int = 8
     """Fewest steps of the automaton in an iteration."""
-    longest_rollout: int = 32
+    longest_rollout: int = 24
     """Most steps of the automaton in an iteration."""
     overflow: float = 100.0
     """Weight of the penalty on states beyond ±1."""
@@ -110,14 +111,15 @@ class TrainConfig:
             raise OptionError(f"--seed {self.seed}: must be from 0 to 2^63 - 1")
 
 
-# A cell that knows where it is paints one frame well; one that does not paints any.
-_ANYWHERE = RuleConfig(position_prior=False)
+# What a cell is not told it cannot depend on: such rules paint frames and scenes they never saw.
+_ANYWHERE = RuleConfig(position_prior=False, velocity_prior=False)
 
 PRESETS = {
     "draft": TrainConfig(rule=_ANYWHERE),
     "standard": TrainConfig(
         iterations=3000,
         learning_rate=2e-3,
+        shortest_rollout=12,
         longest_rollout=48,
         view=ViewConfig(size=192),
         pool=PoolConfig(size=128),

@@ -19,7 +19,7 @@ from vnca.kernels.update.reference import Weights
 from vnca.kernels.update.stencil import stencil
 from vnca.losses.appearance import AppearanceLoss
 from vnca.losses.overflow import overflow
-from vnca.render.brightness import gamma_for_opacity
+from vnca.render.brightness import gamma_for_cell_opacity
 from vnca.render.colour import linear_to_srgb
 from vnca.render.view import View
 from vnca.training.config import TrainConfig
@@ -213,5 +213,7 @@ class Trainer:
 def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:
     """Normalisers from the frame a rule is trained on."""
     density = density_scale(smoke.density)
-    gamma = config.view.gamma or gamma_for_opacity(smoke.density / density, config.view.opacity)
+    gamma = config.view.gamma or gamma_for_cell_opacity(
+        smoke.density / density, config.view.cell_opacity
+    )
     return Scales(density=density, velocity=velocity_scale(smoke), gamma=gamma)
