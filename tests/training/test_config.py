@@ -24,7 +24,7 @@ from vnca.training.config import PRESETS, PoolConfig, TrainConfig, ViewConfig
         (ViewConfig, "size", 31),
         (ViewConfig, "elevation", 91.0),
         (ViewConfig, "step", math.nan),
-        (ViewConfig, "opacity", 1.0),
+        (ViewConfig, "cell_opacity", 1.0),
         (ViewConfig, "gamma", math.inf),
         (PoolConfig, "size", 0),
         (PoolConfig, "reseed_every", 0),

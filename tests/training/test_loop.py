@@ -32,9 +32,10 @@ def same(a: Trainer, b: Trainer) -> bool:
 
 
 def test_training_brings_the_painting_nearer_to_the_style(trainer: Make) -> None:
-    learning = trainer(iterations=30, learning_rate=5e-3, shortest_rollout=6, longest_rollout=6)
+    learning = trainer(iterations=30, shortest_rollout=6, longest_rollout=6)
     losses = [step.loss for step in learning.run()]
-    assert np.mean(losses[-5:]) < 0.8 * np.mean(losses[:5])
+    # All grey at first; views differ from one to the next.
+    assert np.mean(losses[-10:]) < 0.8 * np.mean(losses[:2])
 
 
 def test_same_seed_same_weights_and_another_seed_others(trainer: Make) -> None:

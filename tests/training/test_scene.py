@@ -6,7 +6,6 @@ import torch
 
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import GridError
-from vnca.render.brightness import gamma_for_opacity
 from vnca.training.config import TrainConfig, ViewConfig
 from vnca.training.loop import choose_scales
 from vnca.training.scene import Scene, density_scale, smoke_bounds, velocity_scale
@@ -37,15 +36,6 @@ def test_the_velocity_that_counts_as_one_is_the_rms_speed_in_the_smoke() -> None
     assert velocity_scale(smoke) == pytest.approx(5 / np.sqrt(2))
     assert velocity_scale(replace(smoke, velocity=None)) == 1
     assert velocity_scale(replace(smoke, velocity=0 * velocity)) > 0
-
-
-@pytest.mark.parametrize("opacity", [0.5, 0.97])
-def test_gamma_makes_smoke_as_opaque_as_asked(tiny_smoke: Volume, opacity: float) -> None:
-    gamma = gamma_for_opacity(tiny_smoke.density, opacity)
-    depths = np.concatenate([tiny_smoke.density.sum(axis).ravel() for axis in range(3)])
-    seen = 1 - np.exp(-gamma * depths[depths > 0.1 * depths.max()])
-    assert seen.mean() == pytest.approx(opacity, abs=1e-4)
-    assert gamma_for_opacity(0 * tiny_smoke.density, opacity) == 1
 
 
 def test_a_given_gamma_and_the_units_of_the_file_are_kept_apart(tiny_smoke: Volume) -> None:
