@@ -39,6 +39,8 @@ class FilmConfig:
     """Vertical, degrees; 0 films without perspective."""
     fps: float = 24.0
     """Frames per second."""
+    step: float = 0.5
+    """Distance between samples along a ray, cells; a surface shows terraces where it is long."""
     background: str = "#101014"
     """Colour behind the smoke, #rrggbb."""
 
@@ -53,6 +55,8 @@ class FilmConfig:
             raise OptionError(f"--film.elevation {self.elevation}: must be -90 to 90 degrees")
         if not (isfinite(self.azimuth) and isfinite(self.turn)):
             raise OptionError("--film.azimuth and --film.turn: expected numbers of degrees")
+        if not 0 < self.step <= 4:
+            raise OptionError(f"--film.step {self.step}: must be above 0, at most 4 cells")
         parse_colour(self.background)
 
 
@@ -160,6 +164,7 @@ def picture(
             rows=config.rows,
             columns=config.columns,
             gamma=gamma,
+            step=config.step,
         )
 
 
