@@ -11,7 +11,6 @@ import numpy as np
 from vnca.camera import frame_box
 from vnca.colour import srgb_to_linear
 from vnca.errors import OptionError
-from vnca.files import writable_file
 from vnca.io.video import FilmWriter
 from vnca.typing import Box, FloatArray, Index
 
@@ -88,7 +87,7 @@ class Film:
         import vnca.render.view  # noqa: F401  A missing torch is best told before long work.
 
         self._config, self._box, self._frames, self._device = config, box, frames, device
-        self._writer = FilmWriter(writable_file(path), fps=config.fps)
+        self._writer = FilmWriter(path, fps=config.fps)
         self._shown = 0
 
     def __enter__(self) -> "Film":

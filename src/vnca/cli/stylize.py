@@ -17,7 +17,7 @@ from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.sequence import open_sequence, sequence_box, volumes
 from vnca.errors import OptionError
-from vnca.files import writable_folder
+from vnca.files import writable_file, writable_folder
 from vnca.io.smoke import SmokeFormat, with_fitted_scale, write_painted
 from vnca.io.video import SUFFIXES as FILMS
 from vnca.stylize.config import StylizeConfig
@@ -37,7 +37,7 @@ class Stylize:
     frames: str | None = None
     """Frames to paint, such as 30-53 or 1,4,7-9; all unless given."""
     colour_grid: tuple[str, ...] = ("Cd",)
-    """Names under which the colour is written: Cd, and `color` for Blender's default shader."""
+    """Names under which the colour is written: Cd, `color` as Blender names it, or several."""
     preview: Path | None = None
     """Film of the painting: mp4, gif or webp."""
     gamma: float | None = None
@@ -91,6 +91,8 @@ def paint(options: Stylize) -> None:
     rule = dataclasses.replace(model.rule, scales=scales)
     sequence = open_sequence(options.sequence, options.frames)
     writable_folder(options.out)
+    if options.preview:
+        writable_file(options.preview)
     if any(f.path.resolve().parent == options.out.resolve() for f in sequence):
         raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
     smoke = with_fitted_scale(options.smoke, sequence)

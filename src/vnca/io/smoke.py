@@ -154,12 +154,14 @@ def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat)
     """Velocity at the centres of the density's cells, cells/frame, in the file's axes."""
     if format.velocity_scale == "fit":
         raise OptionError("velocity_scale: fit needs a sequence of frames; set a number")
-    matrix: AnyArray = format.velocity_scale * cells_per_frame(
+    matrix: AnyArray = cells_per_frame(
         format.velocity_units,
         fps=format.fps,
         time_scale=format.time_scale,
         index_to_world=smoke.index_to_world,
     )
+    with np.errstate(over="ignore", invalid="ignore"):
+        matrix = format.velocity_scale * matrix
     if not np.isfinite(matrix).all():
         raise OptionError(f"velocity_scale: expected a finite number, got {format.velocity_scale}")
     values = centred(velocity.values, velocity.stored, velocity.staggered)
