@@ -53,3 +53,11 @@ def test_the_paper_preset_is_the_papers() -> None:
     assert paper.view.mode == "paper"
     assert paper.appearance.pixels == 0
     assert paper.rule.position_prior
+
+
+def test_the_learning_rate_rises_to_its_height_and_falls_at_each_milestone() -> None:
+    config = TrainConfig(
+        iterations=10, learning_rate=0.8, rate_warmup=3, milestones=(0.5, 0.8), decay=0.5
+    )
+    rates = [config.rate(iteration) for iteration in range(10)]
+    assert rates == pytest.approx([0.2, 0.4, 0.6, 0.8, 0.8, 0.4, 0.4, 0.4, 0.2, 0.2])

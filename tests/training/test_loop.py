@@ -63,7 +63,9 @@ def test_training_stops_after_the_iterations_and_goes_on_where_it_was(trainer: M
 
 
 def test_the_learning_rate_falls_at_the_milestones(trainer: Make) -> None:
-    training = trainer(iterations=10, learning_rate=0.01, milestones=(0.3, 0.8), decay=0.1)
+    training = trainer(
+        iterations=10, learning_rate=0.01, rate_warmup=0, milestones=(0.3, 0.8), decay=0.1
+    )
     rates = [training.learning_rate for _ in training.run()]
     # The rate that the next iteration will have.
     np.testing.assert_allclose(rates, [0.01] * 2 + [1e-3] * 5 + [1e-4] * 3)

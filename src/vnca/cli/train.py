@@ -91,6 +91,7 @@ def train(options: Train) -> Path:
         "device": str(device),
         "features": vgg.name,
         "features_origin": vgg.origin,
+        "features_dtype": str(vgg.dtype).removeprefix("torch."),
     }
     with run_folder as folder:
         folder.start(options.config, {**training, "smoke": dataclasses.asdict(smoke_format)})

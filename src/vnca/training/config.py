@@ -70,7 +70,10 @@ class TrainConfig:
     iterations: int = 400
     """Iterations of training."""
     learning_rate: float = 3e-3
-    """Adam's learning rate at the start."""
+    """Adam's learning rate at its highest."""
+    rate_warmup: int = 40
+    """Iterations over which the learning rate rises to it: a rule that changes states too much at
+    once makes them explode."""
     milestones: tuple[float, ...] = (0.6, 0.85)
     """Parts of the iterations after which the learning rate falls."""
     decay: float = 0.4
@@ -95,6 +98,8 @@ class TrainConfig:
             raise OptionError(f"--iterations {self.iterations}: at least 1 is needed")
         if not (0 < self.learning_rate < inf and 0 < self.decay < inf):
             raise OptionError("--learning-rate and --decay must be positive")
+        if self.rate_warmup < 0:
+            raise OptionError(f"--rate-warmup {self.rate_warmup}: must not be negative")
         if not all(0 <= part <= 1 for part in self.milestones):
             raise OptionError(
                 f"--milestones {' '.join(map(str, self.milestones))}: expected parts of the "
@@ -109,6 +114,12 @@ class TrainConfig:
             raise OptionError("--reach and --overflow must not be negative")
         if not 0 <= self.seed < 2**63:
             raise OptionError(f"--seed {self.seed}: must be from 0 to 2^63 - 1")
+
+    def rate(self, iteration: int) -> float:
+        """Learning rate of an iteration, counted from 0: a ramp, then a step at each milestone."""
+        ramp = min(1.0, (iteration + 1) / (self.rate_warmup + 1))
+        passed = sum(iteration >= round(part * self.iterations) for part in self.milestones)
+        return self.learning_rate * ramp * self.decay**passed
 
 
 # What a cell is not told it cannot depend on: such rules paint frames and scenes they never saw.

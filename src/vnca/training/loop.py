@@ -101,11 +101,6 @@ class Trainer:
         self._generator = torch.Generator().manual_seed(config.seed)
         self._pool = Pool(self.scene.seed(config.rule.channels), config.pool, self._random)
         self._optimiser = torch.optim.Adam(self._weights, lr=config.learning_rate)
-        self._schedule = torch.optim.lr_scheduler.MultiStepLR(
-            self._optimiser,
-            [max(1, round(part * config.iterations)) for part in config.milestones],
-            config.decay,
-        )
         self._steps = 0  # of all rollouts: no two share a mask
 
     @property
@@ -116,7 +111,7 @@ class Trainer:
     @property
     def learning_rate(self) -> float:
         """Adam's learning rate in the next iteration."""
-        return float(self._schedule.get_last_lr()[0])
+        return self.config.rate(self.iteration)
 
     def run(self) -> Iterator[Progress]:
         """Train for the remaining iterations, one at a time."""
@@ -139,8 +134,8 @@ class Trainer:
         if bool(torch.isfinite(loss)):
             loss.backward()
         self._normalise_gradients()
+        self._optimiser.param_groups[0]["lr"] = self.learning_rate
         self._optimiser.step()
-        self._schedule.step()
         self.iteration += 1
         terms = {name: float(value.detach()) for name, value in appearance.terms.items()}
         return Progress(
