@@ -38,7 +38,7 @@ def tiny_smoke() -> Volume:
     at = np.stack(np.meshgrid(*[np.arange(12) - 5.5] * 3, indexing="ij"), axis=-1)
     distance = np.linalg.norm(at, axis=-1)
     density = np.clip(5.5 - distance, 0, 1).astype(np.float32)
-    turning = np.stack([-at[..., 1], at[..., 0], np.full_like(distance, 2)], axis=-1)
+    turning = np.stack([-at[..., 1], at[..., 0], np.full_like(distance, 5)], axis=-1)
     velocity = (0.1 * turning * (density > 0)[..., None]).astype(np.float32)
     index_to_world = np.diag([0.1, 0.1, 0.1, 1.0])
     return Volume(density, velocity, (-3, 4, 7), index_to_world, frame=1)

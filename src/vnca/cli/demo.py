@@ -74,7 +74,9 @@ def demonstrate(options: Demo) -> None:
         paint(Stylize(run_folder, sequence, painted, frames=asked, preview=film))
         scales = Model.load(run_folder).rule.scales
         gamma = scales.gamma / scales.density
-        write_image(sheet, _sheet(picture, painted, asked, gamma))
+        view = FilmConfig(rows=SHEET_SIZE, columns=SHEET_SIZE)
+        shown = Render(str(painted), sheet, frames=asked, gamma=gamma, film=view)
+        write_image(sheet, _sheet(picture, shown))
     minutes, seconds = divmod(round(time.monotonic() - start), 60)
     say(f"done in {minutes}:{seconds:02}")
     print(f"film:          {film}\ncontact sheet: {sheet}")
@@ -93,9 +95,7 @@ def _config(options: Demo) -> TrainConfig:
     )
 
 
-def _sheet(style: FloatArray, painted: Path, asked: str, gamma: float) -> FloatArray:
-    """The middle of the style and four frames of the painting, side by side."""
-    view = FilmConfig(rows=SHEET_SIZE, columns=SHEET_SIZE)
-    options = Render(str(painted), out=Path(), gamma=gamma, film=view)
-    frames = strip(open_sequence(str(painted), asked), options, 4)
+def _sheet(style: FloatArray, options: Render) -> FloatArray:
+    """The style and four frames of the painting, side by side."""
+    frames = strip(open_sequence(options.sequence, options.frames), options, 4)
     return contact_sheet([[fit(style, SHEET_SIZE, SHEET_SIZE), *frames]])

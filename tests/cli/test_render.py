@@ -1,0 +1,127 @@
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from vnca.io.vdb import Grid, open_vdb, write_vdb
+
+Vnca = Callable[..., Any]
+SIZE = ("--film.rows", 32, "--film.columns", 40)
+
+
+@pytest.fixture
+def render(vnca: Vnca, smoke: Path, tmp_path: Path) -> Callable[..., Path]:
+    """Renders the smoke to a file of a name, with more options."""
+
+    def run(name: str, *options: object) -> Path:
+        outcome = vnca("render", smoke, "--out", tmp_path / "seen" / name, *SIZE, *options)
+        assert outcome.code == 0, outcome.err
+        return tmp_path / "seen" / name
+
+    return run
+
+
+def pictures(film: Path) -> int:
+    with Image.open(film) as image:
+        assert image.size == (40, 32)
+        return int(getattr(image, "n_frames", 1))
+
+
+def pixels(path: Path) -> Any:
+    with Image.open(path) as image:
+        return np.asarray(image, np.float32) / 255
+
+
+def test_a_film_has_a_picture_a_frame(render: Callable[..., Path]) -> None:
+    assert pictures(render("film.gif")) == 3
+    assert pictures(render("some.webp", "--frames", "1-2")) == 2
+
+
+def test_a_film_in_mp4_can_be_decoded(render: Callable[..., Path]) -> None:
+    av = pytest.importorskip("av")
+    with av.open(str(render("film.mp4", "--film.fps", 12))) as film:
+        frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+        assert film.streams.video[0].average_rate == 12
+    assert [frame.shape for frame in frames] == [(32, 40, 3)] * 3
+    assert max(frame.max() for frame in frames) > 150
+
+
+def test_a_turntable_walks_around_while_a_frame_is_held(render: Callable[..., Path]) -> None:
+    assert pictures(render("turn.gif", "--turntable", 4)) == 12
+
+
+def test_pictures_are_numbered_like_their_frames(render: Callable[..., Path]) -> None:
+    folder = render("frame_####.png").parent
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["frame_0001.png", "frame_0002.png", "frame_0003.png"]
+
+
+def test_one_frame_is_one_picture(render: Callable[..., Path]) -> None:
+    image = pixels(render("one.png", "--frames", "2"))
+    assert image.shape == (32, 40, 3)
+    # Smoke without a colour grid is white.
+    assert image[16, 20].min() > 0.5
+    assert image[0, 0].max() < 0.1
+
+
+def test_the_background_is_the_one_asked_for(render: Callable[..., Path]) -> None:
+    image = pixels(render("one.png", "--frames", "2", "--film.background", "#ff8000"))
+    np.testing.assert_allclose(image[0, 0], [1, 128 / 255, 0], atol=0.01)
+
+
+def test_a_transparent_picture_has_only_smoke_in_it(render: Callable[..., Path]) -> None:
+    image = pixels(render("one.png", "--frames", "2", "--transparent", "--gamma", 5))
+    assert image.shape == (32, 40, 4)
+    assert image[0, 0, 3] == 0
+    assert image[16, 20, 3] > 0.9
+
+
+def test_a_strip_puts_frames_side_by_side(render: Callable[..., Path]) -> None:
+    image = pixels(render("strip.png", "--strip", 2))
+    assert image.shape[1] >= 80
+    halves = np.array_split(image, 2, axis=1)
+    assert all(half.max() > 0.5 for half in halves)
+
+
+def test_a_higher_gamma_makes_smoke_more_opaque(render: Callable[..., Path]) -> None:
+    thin, thick = (
+        pixels(render(f"{gamma}.png", "--frames", "2", "--transparent", "--gamma", gamma))
+        for gamma in (0.05, 0.5)
+    )
+    assert thick[16, 20, 3] > 2 * thin[16, 20, 3]
+
+
+def test_smoke_is_drawn_in_the_colours_of_its_grid(
+    render: Callable[..., Path], smoke: Path
+) -> None:
+    for path in smoke.iterdir():
+        with open_vdb(path) as file:
+            density = file.grids["density"].read()
+            box = density.active_box()
+            _, active = density.to_dense(box)
+            red = np.zeros((*box.shape, 3), np.float32)
+            red[..., 0] = 1
+            paint = Grid.from_dense("paint", red, active, box.lower, like=density)
+            write_vdb(path, [*file.grids.values(), paint])
+    options = ("--frames", "2", "--gamma", 5)
+    painted = pixels(render("red.png", *options, "--colour-grid", "paint"))[16, 20]
+    assert painted[0] > 0.9
+    assert painted[1:].max() < 0.1
+    assert pixels(render("white.png", *options))[16, 20].min() > 0.9
+
+
+def test_a_frame_without_smoke_is_background(
+    vnca: Vnca, render: Callable[..., Path], smoke: Path
+) -> None:
+    path = smoke / "ball_0001.vdb"
+    with open_vdb(path) as file:
+        density = file.grids["density"].read()
+        nothing = np.zeros((0, 0, 0), np.float32)
+        empty = Grid.from_dense("density", nothing, nothing == 0, (0, 0, 0), like=density)
+        write_vdb(path, [empty])
+    folder = render("frame_#.png").parent
+    assert pixels(folder / "frame_1.png").max() < 0.1
+    assert pixels(folder / "frame_2.png").max() > 0.5

@@ -1,0 +1,288 @@
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vnca.automaton.model import Model
+from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
+from vnca.io.vdb import Grid, open_vdb, write_vdb
+from vnca.typing import AnyArray
+from vnca.volume import Volume
+
+Vnca = Callable[..., Any]
+Paint = Callable[..., Path]
+QUICK = ("--warmup", 4, "--steps-per-frame", 2)
+
+
+@pytest.fixture
+def painted(vnca: Vnca, model: Path, smoke: Path, tmp_path: Path) -> Paint:
+    """Paints the smoke, or another sequence, with more options; the folder it is in."""
+    count = 0
+
+    def run(*options: object, sequence: object = smoke) -> Path:
+        nonlocal count
+        count += 1
+        out = tmp_path / f"painted{count}"
+        outcome = vnca("stylize", model, sequence, "--out", out, *QUICK, *options)
+        assert outcome.code == 0, outcome.err
+        return out
+
+    return run
+
+
+def grids(path: Path) -> dict[str, Grid]:
+    with open_vdb(path) as file:
+        return {name: header.read() for name, header in file.grids.items()}
+
+
+def dense(grid: Grid) -> tuple[AnyArray, AnyArray]:
+    return grid.to_dense(grid.active_box())
+
+
+def test_painted_frames_have_density_colour_and_everything_else_as_it_was(
+    painted: Paint, smoke: Path
+) -> None:
+    out = painted()
+    assert sorted(p.name for p in out.iterdir()) == sorted(p.name for p in smoke.iterdir())
+    for path in sorted(out.iterdir()):
+        before, after = grids(smoke / path.name), grids(path)
+        assert list(after) == [*before, "Cd"]
+        for name in ("velocity", "temperature"):
+            for ours, theirs in zip(dense(after[name]), dense(before[name]), strict=True):
+                assert ours.tobytes() == theirs.tobytes()
+            assert after[name].metadata == before[name].metadata
+        for name in ("density", "Cd"):
+            theirs = before["density"]
+            matrix = after[name].transform.index_to_world
+            np.testing.assert_array_equal(matrix, theirs.transform.index_to_world)
+            np.testing.assert_array_equal(dense(after[name])[1], dense(theirs)[1])
+        with open_vdb(path) as ours, open_vdb(smoke / path.name) as source:
+            assert ours.metadata["shot"] == source.metadata["shot"]
+
+
+def test_colour_is_the_rules_and_density_changes_by_half_at_most(
+    painted: Paint, smoke: Path
+) -> None:
+    path = painted() / "ball_0003.vdb"
+    colour, active = dense(grids(path)["Cd"])
+    assert colour.dtype == np.float32
+    assert colour[active].min() >= 0
+    assert colour[active].max() <= 1
+    assert colour[active].std() > 1e-3
+    before = dense(grids(smoke / path.name)["density"])[0][active]
+    after = dense(grids(path)["density"])[0][active]
+    assert (after >= 0.499 * before).all()
+    assert (after <= 1.501 * before).all()
+    assert not np.array_equal(before, after)
+
+
+def test_without_any_strength_smoke_stays_as_it_is_and_white(painted: Paint, smoke: Path) -> None:
+    path = painted("--strength", 0, "--density-strength", 0) / "ball_0002.vdb"
+    after, before = grids(path), grids(smoke / path.name)
+    colour, active = dense(after["Cd"])
+    assert (colour[active] == 1).all()
+    for ours, theirs in zip(dense(after["density"]), dense(before["density"]), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_several_colour_grids_hold_the_same(painted: Paint) -> None:
+    path = painted("--colour-grid", "Cd", "color") / "ball_0001.vdb"
+    after = grids(path)
+    assert list(after) == ["density", "velocity", "temperature", "Cd", "color"]
+    for ours, theirs in zip(dense(after["Cd"]), dense(after["color"]), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_same_seed_same_files_and_another_seed_others(painted: Paint) -> None:
+    one, two, other = painted(), painted(), painted("--seed", 1)
+    name = "ball_0002.vdb"
+    assert (one / name).read_bytes() == (two / name).read_bytes()
+    assert (one / name).read_bytes() != (other / name).read_bytes()
+
+
+def test_both_backends_paint_alike(painted: Paint) -> None:
+    native, reference = (painted("--backend", name) for name in ("native", "reference"))
+    a, b = (dense(grids(out / "ball_0003.vdb")["Cd"])[0] for out in (native, reference))
+    np.testing.assert_allclose(a, b, atol=1e-4)
+
+
+def test_chosen_frames_only_and_gaps_are_told(vnca: Vnca, model: Path, smoke: Path) -> None:
+    (smoke / "ball_0002.vdb").unlink()
+    out = smoke.parent / "out"
+    outcome = vnca("stylize", model, smoke / "ball_%04d.vdb", "--out", out, "--frames", "2-3")
+    assert outcome.code == 0
+    assert "no file for frames 2" in outcome.err
+    assert [path.name for path in out.iterdir()] == ["ball_0003.vdb"]
+
+
+@pytest.mark.parametrize("cells", [0, 3])
+def test_a_frame_without_smoke_passes_through(painted: Paint, smoke: Path, cells: int) -> None:
+    path = smoke / "ball_0002.vdb"
+    with open_vdb(path) as file:
+        density = file.grids["density"].read()
+        nothing = np.zeros((cells,) * 3, np.float32)
+        empty = Grid.from_dense("density", nothing, nothing == 0, (0, 6, 12), like=density)
+        write_vdb(path, [empty, file.grids["velocity"], file.grids["temperature"]])
+    out = painted("--preview", smoke.parent / "film.gif")
+    after = grids(out / path.name)
+    assert list(after) == ["density", "velocity", "temperature", "Cd"]
+    for name in ("density", "Cd"):
+        assert after[name].active_voxels == cells**3
+    assert not dense(after["density"])[0].any()
+    assert after["temperature"].active_voxels == grids(path)["temperature"].active_voxels
+    # The painting starts afresh after it.
+    assert np.isfinite(dense(grids(out / "ball_0003.vdb")["Cd"])[0]).all()
+
+
+def test_smoke_of_another_resolution_without_velocity(painted: Paint, tmp_path: Path) -> None:
+    density = np.random.default_rng(0).random((21, 6, 17)).astype(np.float32)
+    for number in (7, 8):
+        volume = Volume(density, None, (0, 0, 0), np.diag([0.3, 0.3, 0.3, 1]), number)
+        write_smoke(tmp_path / "other" / f"cloud.{number}.vdb", volume)
+    out = painted(sequence=tmp_path / "other" / "cloud.$F.vdb")
+    assert sorted(path.name for path in out.iterdir()) == ["cloud.7.vdb", "cloud.8.vdb"]
+    assert list(grids(out / "cloud.8.vdb")) == ["density", "Cd"]
+    assert dense(grids(out / "cloud.8.vdb")["Cd"])[0].shape == (21, 6, 17, 3)
+
+
+def test_a_rule_sees_the_same_smoke_whatever_axis_is_up(
+    painted: Paint, model: Path, tiny_smoke: Volume, tmp_path: Path
+) -> None:
+    """The same ball in files with y up is painted alike, and keeps the axes of its file."""
+    assert tiny_smoke.velocity is not None
+    write_smoke(tmp_path / "z" / "ball_1.vdb", tiny_smoke)
+    # Ours are (x, y, z); with y up, files have (x, z, -y).
+    turned = replace(
+        tiny_smoke,
+        density=np.ascontiguousarray(tiny_smoke.density.transpose(0, 2, 1)[:, :, ::-1]),
+        velocity=np.ascontiguousarray(
+            tiny_smoke.velocity.transpose(0, 2, 1, 3)[:, :, ::-1, [0, 2, 1]] * [1, 1, -1]
+        ).astype(np.float32),
+    )
+    write_smoke(tmp_path / "y" / "ball_1.vdb", turned)
+    seen = read_smoke(tmp_path / "y" / "ball_1.vdb", SmokeFormat(up_axis="y"))
+    straight = read_smoke(tmp_path / "z" / "ball_1.vdb", SmokeFormat())
+    np.testing.assert_array_equal(seen.density, straight.density)
+    np.testing.assert_allclose(seen.velocity, straight.velocity, atol=1e-6)  # type: ignore[arg-type]
+    out = painted("--up-axis", "y", sequence=tmp_path / "y" / "ball_1.vdb")
+    colour, active = dense(grids(out / "ball_1.vdb")["Cd"])
+    source = grids(tmp_path / "y" / "ball_1.vdb")["density"]
+    np.testing.assert_array_equal(active, dense(source)[1])
+    assert colour[active].std() > 1e-3
+
+
+def test_a_folder_in_mantaflows_layout(painted: Paint, tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    for number in (4, 5):
+        for name, components in (("d", 1), ("v", 3)):
+            (tmp_path / "npz" / name).mkdir(parents=True, exist_ok=True)
+            values = random.random((6, 7, 8, components)).astype(np.float32)
+            np.savez_compressed(tmp_path / "npz" / name / f"{number:03d}.npz", x=values)
+    out = painted(sequence=tmp_path / "npz")
+    assert sorted(path.name for path in out.iterdir()) == ["004.vdb", "005.vdb"]
+    after = grids(out / "005.vdb")
+    assert set(after) == {"density", "Cd", "velocity"}
+    assert dense(after["Cd"])[0].shape == (8, 7, 6, 3)
+
+
+def test_a_preview_has_a_picture_a_frame(painted: Paint, tmp_path: Path) -> None:
+    from PIL import Image
+
+    film = tmp_path / "film.gif"
+    size = ("--film.rows", 32, "--film.columns", 48)
+    painted("--preview", film, *size, "--film.turn", 90, "--gamma", 2)
+    with Image.open(film) as pictures:
+        assert pictures.size == (48, 32)
+        assert getattr(pictures, "n_frames", 1) == 3
+
+
+def test_a_failure_half_way_keeps_what_is_whole_and_no_film(
+    vnca: Vnca, model: Path, smoke: Path, tmp_path: Path
+) -> None:
+    last = smoke / "ball_0003.vdb"
+    with open_vdb(last) as file:
+        density = file.grids["density"].read()
+        values, active = dense(density)
+        values[5, 5, 5] = np.nan
+        poisoned = Grid.from_dense(
+            "density", values, active, density.active_box().lower, like=density
+        )
+        write_vdb(last, [poisoned])
+    out, film = tmp_path / "out", tmp_path / "film.gif"
+    outcome = vnca("stylize", model, smoke, "--out", out, *QUICK, "--preview", film)
+    assert outcome.code == 2
+    assert "Traceback" not in outcome.err
+    assert outcome.err.splitlines()[-1].startswith(f"vnca: {last}")
+    assert {path.name for path in out.iterdir()} <= {"ball_0001.vdb", "ball_0002.vdb"}
+    assert [path for path in tmp_path.iterdir() if "film" in path.name] == []
+
+
+def test_the_scale_of_the_density_can_be_given(painted: Paint, smoke: Path, model: Path) -> None:
+    """Smoke in other units is painted alike if what counts as 1 is told."""
+    plain = painted()
+    for path in smoke.iterdir():
+        volume = read_smoke(path, SmokeFormat())
+        write_smoke(path, replace(volume, density=64 * volume.density))
+    scale = 64 * Model.load(model).rule.scales.density
+    scaled = painted("--density-scale", scale)
+    a, b = (dense(grids(out / "ball_0002.vdb")["Cd"])[0] for out in (plain, scaled))
+    np.testing.assert_allclose(a, b, atol=1e-5)
+
+
+# What only training needs: nothing of it may be imported to apply a style.
+TRAINING_ONLY = ("torch", "scipy", "h5py", "av", "OpenEXR", "tensorboard", "jaxtyping")
+WITHOUT = f"""
+import sys
+class Without:
+    def __init__(self, finder):
+        self.finder = finder
+    def __getattr__(self, name):
+        return getattr(self.finder, name)
+    def find_spec(self, name, *where):
+        is_absent = name.partition(".")[0] in {TRAINING_ONLY}
+        return None if is_absent else self.finder.find_spec(name, *where)
+sys.meta_path[:] = map(Without, sys.meta_path)
+from vnca.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def without_training(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", WITHOUT, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, env=os.environ)
+
+
+def test_applying_a_style_needs_nothing_that_training_does(
+    painted: Paint, model: Path, smoke: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "bare"
+    done = without_training("stylize", model, smoke, "--out", out, *QUICK)
+    assert done.returncode == 0, done.stderr
+    expected = painted()
+    for path in expected.iterdir():
+        assert (out / path.name).read_bytes() == path.read_bytes()
+    done = without_training("info", model)
+    assert done.returncode == 0, done.stderr
+    assert "weights" in done.stdout
+
+
+def test_what_is_missing_is_named(model: Path, smoke: Path, style: Path, tmp_path: Path) -> None:
+    stylize = ["stylize", model, smoke, "--out", tmp_path / "out"]
+    for arguments in (
+        ["train", smoke / "ball_0001.vdb", style, "--out", tmp_path / "out"],
+        [*stylize, "--preview", tmp_path / "film.gif"],
+        [*stylize, "--backend", "reference"],
+        ["simulate", "plume", "--out", tmp_path / "out"],
+    ):
+        done = without_training(*arguments)
+        assert done.returncode == 2, done.stderr
+        assert done.stderr.count("\n") == 1, done.stderr
+        assert done.stderr.startswith("vnca: ")
+        assert "vnca[train]" in done.stderr
+        assert not (tmp_path / "out").exists()
