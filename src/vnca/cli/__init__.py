@@ -24,6 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Each subcommand is a module of this package with a function `run(arguments)`. It is imported
     only when it is called, so that `vnca info` never waits for torch.
     """
+    # On a machine that is busy, threads that spin while they wait cost several times the work.
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(_usage())
