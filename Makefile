@@ -47,6 +47,7 @@ lock:
 
 bench: setup
 	$(BIN)/python benchmarks/vdb.py
+	$(BIN)/python benchmarks/step.py
 
 clean:
 	rm -rf $(VENV)
