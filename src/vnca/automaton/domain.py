@@ -74,10 +74,22 @@ class Domain:
         return len(self.cells)
 
     @cached_property
+    def _extent(self) -> Box:
+        """Around the cells with a margin of one: the box of a whole sequence may be far larger."""
+        if len(self) == 0:
+            return Box((0, 0, 0), (1, 1, 1))
+        x, y, z = self.cells.min(axis=0).tolist()
+        u, v, w = (self.cells.max(axis=0) + 1).tolist()
+        return Box((x, y, z), (u, v, w)).grown(1)
+
+    @cached_property
     def neighbours(self) -> IntArray:
         """`[27, n]` rows of the state around each cell, n where nothing lives."""
-        lower = np.asarray(self.box.lower)
-        row_of = np.full(self.box.shape, len(self), dtype=np.int32)
+        box = self.box
+        if self.border == "replicate" and len(self):
+            box = self._extent.intersection(self.box)
+        lower = np.asarray(box.lower)
+        row_of = np.full(box.shape, len(self), dtype=np.int32)
         row_of[tuple((self.cells - lower).T)] = np.arange(len(self), dtype=np.int32)
         mode = "edge" if self.border == "replicate" else "wrap"
         row_of = np.pad(row_of, 1, mode=mode)
@@ -112,7 +124,7 @@ class Domain:
 
     def carry(self, state: AnyArray, other: "Domain") -> AnyArray:
         """The state on `other`: cells alive in both keep theirs, new ones start from zero."""
-        box = self.box.union(other.box)
+        box = self._extent.union(other._extent)
         lower, shape = np.asarray(box.lower), box.shape
         row_of = np.full(int(np.prod(shape)), len(self), dtype=np.int32)
         row_of[np.ravel_multi_index(tuple((self.cells - lower).T), shape)] = np.arange(len(self))

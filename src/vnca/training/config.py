@@ -71,7 +71,7 @@ class TrainConfig:
     """Iterations of training."""
     learning_rate: float = 3e-3
     """Adam's learning rate at its highest."""
-    rate_warmup: int = 40
+    rate_warmup: int = 15
     """Iterations over which the learning rate rises to it: a rule that changes states too much at
     once makes them explode."""
     milestones: tuple[float, ...] = (0.6, 0.85)
@@ -122,8 +122,8 @@ class TrainConfig:
         return self.learning_rate * ramp * self.decay**passed
 
 
-# What a cell is not told it cannot depend on: such rules paint frames and scenes they never saw.
-_ANYWHERE = RuleConfig(position_prior=False, velocity_prior=False)
+# A cell that knows where it is paints one frame well; one that does not paints any.
+_ANYWHERE = RuleConfig(position_prior=False)
 
 PRESETS = {
     "draft": TrainConfig(rule=_ANYWHERE),
