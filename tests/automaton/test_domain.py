@@ -81,3 +81,12 @@ def test_dilation_is_distance_along_the_axes(seed: int, reach: int) -> None:
     for cell in np.argwhere(np.ones_like(mask)):
         near = len(smoke) > 0 and np.abs(smoke - cell).max(axis=1).min() <= reach
         assert grown[tuple(cell)] == near
+
+
+def test_cost_follows_the_smoke_however_far_a_sequence_reaches() -> None:
+    box = Box((-(2**30),) * 3, (2**30,) * 3)  # as an array, more than any machine has
+    domain = Domain.from_mask(np.ones((2, 2, 2), bool), (5, 5, 5), box=box)
+    assert domain.neighbours.shape == (27, 8)
+    assert np.count_nonzero(domain.neighbours < 8) == 8 * 8
+    state = np.arange(9, dtype=np.float32)[:, None] + 1
+    np.testing.assert_array_equal(domain.carry(state, domain), state)

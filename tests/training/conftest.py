@@ -33,6 +33,7 @@ def tiny_config() -> TrainConfig:
         view=ViewConfig(size=32),
         appearance=AppearanceConfig(samples=128, layers=("relu1_1", "relu2_1", "relu3_1")),
         iterations=3,
+        rate_warmup=0,
         shortest_rollout=2,
         longest_rollout=4,
     )
