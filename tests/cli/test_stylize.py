@@ -129,7 +129,8 @@ def test_a_frame_without_smoke_passes_through(painted: Paint, smoke: Path, cells
         nothing = np.zeros((cells,) * 3, np.float32)
         empty = Grid.from_dense("density", nothing, nothing == 0, (0, 6, 12), like=density)
         write_vdb(path, [empty, file.grids["velocity"], file.grids["temperature"]])
-    out = painted("--preview", smoke.parent / "film.gif")
+    film = ("--preview", smoke.parent / "film.gif", "--film.rows", 32, "--film.columns", 32)
+    out = painted(*film)
     after = grids(out / path.name)
     assert list(after) == ["density", "velocity", "temperature", "Cd"]
     for name in ("density", "Cd"):
