@@ -56,6 +56,8 @@ def rewritten(path: Path, **changes: Any) -> None:
         ({"rule": 3}, "damaged"),
         ({"rule": {"no_such_field": 1}}, "damaged"),
         ({"rule": {"channels": 2}}, "damaged"),
+        ({"scales": {"density": 0.0}}, r"damaged.*density"),
+        ({"scales": {"gamma": float("nan")}}, r"damaged.*gamma"),
         ({"rule": {"channels": 5, "hidden": 8}}, "expected shape"),
     ],
 )

@@ -1,5 +1,6 @@
 """The update rule of an automaton: its hyperparameters, weights and normalisers."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -68,6 +69,11 @@ class Scales:
     """Cells per frame that count as 1."""
     gamma: float = 1.0
     """Extinction of density 1, per cell: the paper's brightness control."""
+
+    def __post_init__(self) -> None:
+        for name in ("density", "velocity", "gamma"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise OptionError(f"scale '{name}' {getattr(self, name)}: must be positive")
 
 
 @dataclass(frozen=True, eq=False)
