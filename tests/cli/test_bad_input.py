@@ -411,7 +411,6 @@ def test_training_options_out_of_range(
         ("--density-strength", "nan"),
         ("--steps-per-frame", "-1"),
         ("--warmup", "-1"),
-        ("--reach", "-1"),
         ("--gamma", "0"),
         ("--gamma", "nan"),
         ("--density-scale", "inf"),

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from vnca.automaton.domain import dilate
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import OptionError
 from vnca.stylize.ahead import read_ahead
@@ -120,3 +121,13 @@ def test_options_out_of_range_are_named() -> None:
         StylizeConfig(density_strength=1.5)
     with pytest.raises(OptionError, match="--steps-per-frame"):
         dataclasses.replace(StylizeConfig(), steps_per_frame=-1)
+
+
+@pytest.mark.parametrize("reach", [0, 2])
+def test_cells_live_as_far_from_the_smoke_as_the_rule_was_trained_with(reach: int) -> None:
+    config = dataclasses.replace(RULE.config, reach=reach)
+    rule = dataclasses.replace(RULE, config=config)
+    smoke = Volume(np.pad(ball(0).density, 4), None, (0, 0, 0), np.eye(4), 0)
+    (painting,) = stylize([smoke], rule, counting_step, StylizeConfig(), box=smoke.box)
+    lived = (painting.colour != 1).any(axis=-1)
+    np.testing.assert_array_equal(lived, dilate(smoke.density > 0.5, reach))

@@ -18,7 +18,6 @@ from vnca.training.config import PRESETS, PoolConfig, TrainConfig, ViewConfig
         (TrainConfig, "milestones", (100.0, 200.0)),
         (TrainConfig, "shortest_rollout", 0),
         (TrainConfig, "overflow", math.nan),
-        (TrainConfig, "reach", -1),
         (TrainConfig, "seed", -1),
         (TrainConfig, "seed", 2**64),
         (ViewConfig, "size", 31),

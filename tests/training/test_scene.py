@@ -15,7 +15,7 @@ from vnca.volume import Volume
 
 def scene(smoke: Volume, **scales: float) -> Scene:
     rule = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(**scales), seed=0)
-    return Scene(smoke, rule, reach=1)
+    return Scene(smoke, rule)
 
 
 def test_the_density_that_counts_as_one_ignores_empty_cells_and_a_few_bright_ones() -> None:

@@ -9,7 +9,7 @@ from vnca.errors import OptionError
 class StylizeConfig:
     """How a rule is rolled over a sequence, and how strongly it shows."""
 
-    steps_per_frame: int = 8
+    steps_per_frame: int = 16
     """Steps of the automaton between two frames."""
     warmup: int = 64
     """Steps on the first frame before it is painted."""
@@ -17,14 +17,12 @@ class StylizeConfig:
     """Colour of the painting, from 0 (white smoke) to 1."""
     density_strength: float = 1.0
     """How much the painting changes the density, from 0 (not at all) to 1."""
-    reach: int = 3
-    """Cells live up to this far from the smoke, so that they have lived when smoke arrives."""
     seed: int = 0
     """Same seed, same machine, same painting."""
 
     def __post_init__(self) -> None:
-        if self.steps_per_frame < 0 or self.warmup < 0 or self.reach < 0:
-            raise OptionError("--steps-per-frame, --warmup and --reach must not be negative")
+        if self.steps_per_frame < 0 or self.warmup < 0:
+            raise OptionError("--steps-per-frame and --warmup must not be negative")
         for name in ("strength", "density_strength"):
             if not 0 <= getattr(self, name) <= 1:
                 option = name.replace("_", "-")

@@ -55,7 +55,7 @@ def stylize(
         box: Holds the smoke of all frames; gives cells their position. Known from the files'
             headers before the first frame is read.
     """
-    box = box.grown(config.reach)
+    box = box.grown(rule.config.reach)
     domain: Domain | None = None
     state = np.zeros((1, rule.config.channels), dtype=np.float32)
     steps_done = 0
@@ -64,7 +64,7 @@ def stylize(
             smoke.density,
             smoke.origin,
             threshold=SMOKE_THRESHOLD * rule.scales.density,
-            reach=config.reach,
+            reach=rule.config.reach,
             box=box,
         )
         if len(here) == 0:

@@ -84,8 +84,6 @@ class TrainConfig:
     """Most steps of the automaton in an iteration."""
     overflow: float = 100.0
     """Weight of the penalty on states beyond ±1."""
-    reach: int = 1
-    """Cells live up to this far from the smoke."""
     features: str = "edges"
     """Weights of VGG16: edges, imagenet or a path."""
     backend: Literal["auto", "native", "reference"] = "auto"
@@ -110,8 +108,8 @@ class TrainConfig:
                 f"--shortest-rollout {self.shortest_rollout}: must be from 1 to "
                 f"--longest-rollout ({self.longest_rollout})"
             )
-        if self.reach < 0 or not 0 <= self.overflow < inf:
-            raise OptionError("--reach and --overflow must not be negative")
+        if not 0 <= self.overflow < inf:
+            raise OptionError(f"--overflow {self.overflow}: must not be negative")
         if not 0 <= self.seed < 2**63:
             raise OptionError(f"--seed {self.seed}: must be from 0 to 2^63 - 1")
 

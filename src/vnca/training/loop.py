@@ -82,7 +82,7 @@ class Trainer:
         self.iteration = 0
         rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
         self._rule = rule
-        self.scene = Scene(smoke, rule, reach=config.reach, device=device)
+        self.scene = Scene(smoke, rule, device=device)
         self._weights = Weights(
             *(
                 torch.tensor(w, device=device, requires_grad=True)

@@ -25,15 +25,12 @@ class Scene:
         priors: `[n, 7]`.
     """
 
-    def __init__(
-        self, smoke: Volume, rule: Rule, *, reach: int, device: torch.device | str = "cpu"
-    ) -> None:
+    def __init__(self, smoke: Volume, rule: Rule, *, device: torch.device | str = "cpu") -> None:
         """Prepare a frame.
 
         Args:
             smoke: The frame; must hold smoke.
             rule: Its normalisers and switches are used, not its weights.
-            reach: Cells live up to this far from the smoke.
             device: Where rollouts and pictures are computed.
 
         Raises:
@@ -44,8 +41,8 @@ class Scene:
             smoke.density,
             smoke.origin,
             threshold=SMOKE_THRESHOLD * rule.scales.density,
-            reach=reach,
-            box=self.box.grown(reach),
+            reach=rule.config.reach,
+            box=self.box.grown(rule.config.reach),
         )
         self.gamma = rule.scales.gamma
         self.neighbours = torch.from_numpy(self.domain.neighbours).to(device)
