@@ -3,9 +3,11 @@
 import hashlib
 import importlib.metadata
 import socket
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import pytest
@@ -137,7 +139,7 @@ def test_imagenet_is_downloaded_once_with_progress(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(module, "IMAGENET_URL", pth.as_uri())
+    monkeypatch.setattr(module, "imagenet_url", lambda: pth.as_uri())
     monkeypatch.setattr(module, "IMAGENET_SHA256", sha256(pth)[:8])
     loaded = load_weights("imagenet")
     assert "MB" in capsys.readouterr().err
@@ -149,14 +151,14 @@ def test_imagenet_is_downloaded_once_with_progress(
         rtol=1e-3,
         atol=1e-3,
     )
-    monkeypatch.setattr(module, "IMAGENET_URL", "file:///gone")
+    monkeypatch.setattr(module, "imagenet_url", lambda: "file:///gone")
     assert load_weights("imagenet").origin == loaded.origin
 
 
 def test_damaged_download_is_refused(
     pth: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "IMAGENET_URL", pth.as_uri())
+    monkeypatch.setattr(module, "imagenet_url", lambda: pth.as_uri())
     with pytest.raises(BackendUnavailableError, match=r"damaged.*88682ab5.*--features edges"):
         load_weights("imagenet")
     assert not list(cache.glob("*"))
@@ -172,7 +174,7 @@ def silent_server() -> Iterator[str]:
 def test_silent_server_is_given_up_soon(
     silent_server: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "IMAGENET_URL", silent_server)
+    monkeypatch.setattr(module, "imagenet_url", lambda: silent_server)
     monkeypatch.setattr(module, "CONNECT_SECONDS", 0.2)
     monkeypatch.setenv("no_proxy", "*")
     started = time.monotonic()
@@ -184,9 +186,22 @@ def test_silent_server_is_given_up_soon(
 def test_refused_connection_names_the_alternatives(monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-    monkeypatch.setattr(module, "IMAGENET_URL", f"http://127.0.0.1:{port}/vgg16.pth")
+    monkeypatch.setattr(module, "imagenet_url", lambda: f"http://127.0.0.1:{port}/vgg16.pth")
     monkeypatch.setenv("no_proxy", "*")
     with pytest.raises(BackendUnavailableError, match=r"refused.*--features edges.*path"):
+        load_weights("imagenet")
+
+
+def test_torchvision_tells_where_the_weights_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    weights = SimpleNamespace(IMAGENET1K_FEATURES=SimpleNamespace(url="file:///vgg16.pth"))
+    monkeypatch.setitem(sys.modules, "torchvision", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "torchvision.models", SimpleNamespace(VGG16_Weights=weights))
+    assert module.imagenet_url() == "file:///vgg16.pth"
+
+
+def test_missing_torchvision_is_told_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "torchvision.models", None)
+    with pytest.raises(BackendUnavailableError, match=r"pip install torchvision.*--features edges"):
         load_weights("imagenet")
 
 

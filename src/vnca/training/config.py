@@ -124,7 +124,7 @@ class TrainConfig:
 _ANYWHERE = RuleConfig(position_prior=False)
 
 PRESETS = {
-    "draft": TrainConfig(rule=_ANYWHERE),
+    "draft": TrainConfig(rule=_ANYWHERE, pool=PoolConfig(size=16)),
     "standard": TrainConfig(
         iterations=3000,
         learning_rate=2e-3,
