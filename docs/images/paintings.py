@@ -23,7 +23,7 @@ def main(out: str, *pairs: str) -> None:
     view = FilmConfig(rows=SIZE, columns=SIZE)
     rows = []
     for style, painted in zip(pairs[::2], pairs[1::2], strict=True):
-        frames = strip(open_sequence(painted, None), Render(painted, Path(), film=view), 4)
+        frames = strip(open_sequence(painted, None), Render(painted, Path(out), film=view), 4)
         rows.append([fit(read_image(Path(style)), SIZE, SIZE), *frames])
     write_image(Path(out), contact_sheet(rows, background=BACKGROUND))
 
