@@ -2,7 +2,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 from vnca.automaton.model import Model
+from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.cli import main
+from vnca.cli.stylize import Stylize
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
 from vnca.typing import AnyArray
@@ -287,3 +290,20 @@ def test_what_is_missing_is_named(model: Path, smoke: Path, style: Path, tmp_pat
         assert done.stderr.startswith("vnca: ")
         assert "vnca[train]" in done.stderr
         assert not (tmp_path / "out").exists()
+
+
+def test_smoke_is_read_as_it_was_for_training_unless_told_otherwise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rule = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(), seed=0)
+    recorded = asdict(SmokeFormat(velocity_units="mantaflow", fps=30, time_scale=0.4))
+    Model(rule, {"smoke": recorded}).save(tmp_path / "model.safetensors")
+    seen: list[Stylize] = []
+    monkeypatch.setattr("vnca.cli.stylize.paint", seen.append)
+    command = ["stylize", str(tmp_path / "model.safetensors"), "smoke", "--out", "out"]
+    assert main(command) == 0
+    assert main([*command, "--fps", "25", "--velocity-units", "m/s"]) == 0
+    assert [(s.smoke.velocity_units, s.smoke.fps, s.smoke.time_scale) for s in seen] == [
+        ("mantaflow", 30, 0.4),
+        ("m/s", 25, 0.4),
+    ]

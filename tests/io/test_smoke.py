@@ -152,6 +152,14 @@ def test_units_and_scale_are_applied(
     np.testing.assert_allclose(velocity, vectors() * np.float32(factor), rtol=1e-6)
 
 
+def test_a_file_that_says_its_units_is_believed(tmp_path: Path) -> None:
+    volume = Volume(np.ones((3, 3, 3), np.float32), None, (0, 0, 0), np.eye(4), 1)
+    velocity = np.full((3, 3, 3, 3), 2, np.float32)
+    write_smoke(tmp_path / "a.vdb", replace(volume, velocity=velocity))
+    other = SmokeFormat(velocity_units="mantaflow", fps=30, time_scale=0.4, velocity_scale=0.8)
+    np.testing.assert_array_equal(read_smoke(tmp_path / "a.vdb", other).velocity, velocity)
+
+
 def test_files_with_y_up_are_turned(tmp_path: Path) -> None:
     path = saved(tmp_path / "s.vdb", grid("density", density()), grid("velocity", vectors()))
     form = SmokeFormat(up_axis="y")

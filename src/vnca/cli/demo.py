@@ -33,7 +33,7 @@ class Demo:
     out: Path = Path("demo")
     """Folder for everything the demo makes."""
     quick: bool = False
-    """Small and rough, in about two minutes instead of ten."""
+    """Small and rough, in a fraction of the time."""
     style: Path | None = None
     """Another picture to learn from."""
     seed: int = 0

@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -16,7 +16,7 @@ from vnca.cli.film import Film, FilmConfig
 from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.sequence import open_sequence, sequence_box, volumes
-from vnca.errors import OptionError
+from vnca.errors import ModelError, OptionError
 from vnca.files import writable_file, writable_folder
 from vnca.io.smoke import SmokeFormat, with_fitted_scale, write_painted
 from vnca.io.video import SUFFIXES as FILMS
@@ -71,8 +71,21 @@ class Stylize:
 
 
 def run(arguments: Sequence[str]) -> None:
-    """Read the options and paint."""
-    paint(parse("stylize", Stylize, arguments))
+    """Read the options and paint; smoke is read as it was for training unless told otherwise."""
+    options = parse("stylize", Stylize, arguments)
+    recorded = Model.load(options.model).training.get("smoke")
+    if recorded:
+        missing: Any = tyro.MISSING
+        defaults = Stylize(missing, missing, missing, smoke=_recorded(options.model, recorded))
+        options = parse("stylize", Stylize, arguments, default=defaults)
+    paint(options)
+
+
+def _recorded(model: Path, smoke: Any) -> SmokeFormat:
+    try:
+        return SmokeFormat(**smoke)
+    except TypeError as error:
+        raise ModelError(f"{model}: damaged model metadata (smoke: {error})") from error
 
 
 def paint(options: Stylize) -> None:

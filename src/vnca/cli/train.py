@@ -89,12 +89,13 @@ def train(options: Train) -> Path:
         "preset": options.preset,
         "seed": options.config.seed,
         "device": str(device),
+        "smoke": dataclasses.asdict(smoke_format),
         "features": vgg.name,
         "features_origin": vgg.origin,
         "features_dtype": str(vgg.dtype).removeprefix("torch."),
     }
     with run_folder as folder:
-        folder.start(options.config, {**training, "smoke": dataclasses.asdict(smoke_format)})
+        folder.start(options.config, training)
         say(
             f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
             f"features '{vgg.name}', {device}"

@@ -9,7 +9,7 @@ import numpy as np
 from vnca.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.io.npz import read_npz_smoke
 from vnca.io.orientation import box_to_file, to_file, to_internal
-from vnca.io.smoke_format import SmokeFormat, up_axis_of
+from vnca.io.smoke_format import CELLS_PER_FRAME, UNITS_METADATA, SmokeFormat, up_axis_of
 from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import density_header
@@ -96,7 +96,7 @@ def write_smoke(path: Path, volume: Volume) -> None:
                 active,
                 volume.origin,
                 transform=transform,
-                metadata={"velocity_units": "cells/frame"},
+                metadata={UNITS_METADATA: CELLS_PER_FRAME},
             )
         )
     write_vdb(path, grids)

@@ -150,11 +150,11 @@ def _non_negative(density: FloatArray, path: Path) -> FloatArray:
     return np.maximum(density, 0, out=density)
 
 
-def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat) -> FloatArray:
-    """Velocity at the centres of the density's cells, cells/frame, in the file's axes."""
+def _to_cells_per_frame(smoke: StoredSmoke, format: SmokeFormat) -> AnyArray:
+    """3×3, from the file's units to cells/frame."""
     if format.velocity_scale == "fit":
         raise OptionError("velocity_scale: fit needs a sequence of frames; set a number")
-    matrix: AnyArray = cells_per_frame(
+    matrix = cells_per_frame(
         format.velocity_units,
         fps=format.fps,
         time_scale=format.time_scale,
@@ -164,6 +164,14 @@ def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat)
         matrix = format.velocity_scale * matrix
     if not np.isfinite(matrix).all():
         raise OptionError(f"velocity_scale: expected a finite number, got {format.velocity_scale}")
+    return matrix
+
+
+def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat) -> FloatArray:
+    """Velocity at the centres of the density's cells, cells/frame, in the file's axes."""
+    matrix = _to_cells_per_frame(smoke, format)  # refuses bad options, needed or not
+    if velocity.in_cells_per_frame:
+        matrix = np.eye(3)
     values = centred(velocity.values, velocity.stored, velocity.staggered)
     known = velocity.stored[:-1, :-1, :-1]
     if not np.array_equal(matrix, np.eye(3)):

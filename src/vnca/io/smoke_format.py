@@ -12,6 +12,9 @@ from vnca.io.velocity import VelocityUnits
 from vnca.typing import AnyArray, BoolArray, Box, FloatArray, Index
 
 NO_VELOCITY = "none"
+# What a velocity grid's metadata says of its units, where it was written by vnca.
+UNITS_METADATA = "velocity_units"
+CELLS_PER_FRAME: VelocityUnits = "cells/frame"
 # Files of smoke by suffix, and which of their axes points up unless the user says otherwise.
 UP_AXES: dict[str, UpAxis] = {".vdb": "z", ".npz": "y"}
 
@@ -32,7 +35,8 @@ class SmokeFormat:
     class or offset in VDB files, always in Mantaflow's npz files."""
 
     velocity_units: VelocityUnits = "cells/frame"
-    """Units of the velocity. Blender's caches need mantaflow, with --fps and --time-scale."""
+    """Units of the velocity. Blender's caches need mantaflow, with --fps and --time-scale. Files
+    that `vnca simulate` wrote say their own, which count instead of these options."""
 
     fps: float = 24.0
     """Frames a second, for the units m/s and mantaflow."""
@@ -55,11 +59,13 @@ class StoredVelocity:
         values: `[x + 1, y + 1, z + 1, 3]`, in the file's units.
         stored: `[x + 1, y + 1, z + 1]`, which cells the file has.
         staggered: Which components lie on the lower faces of their cells.
+        in_cells_per_frame: Whether the file itself says so; units and scale then do not count.
     """
 
     values: FloatArray
     stored: BoolArray
     staggered: tuple[bool, bool, bool]
+    in_cells_per_frame: bool = False
 
 
 @dataclass(frozen=True, eq=False)

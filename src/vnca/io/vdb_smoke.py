@@ -7,7 +7,9 @@ import numpy as np
 
 from vnca.errors import FileFormatError, GridError
 from vnca.io.smoke_format import (
+    CELLS_PER_FRAME,
     NO_VELOCITY,
+    UNITS_METADATA,
     SmokeFormat,
     StoredSmoke,
     StoredVelocity,
@@ -93,7 +95,8 @@ def _read_velocity(
     faces = [_is_on_faces(h, axis, format, density) for h, axis in zip(headers, axes, strict=True)]
     parts = [_dense(header, box) for header in headers]
     if len(headers) == 1:
-        return StoredVelocity(*parts[0], (faces[0], faces[0], faces[0]))
+        told = headers[0].metadata.value(UNITS_METADATA) == CELLS_PER_FRAME
+        return StoredVelocity(*parts[0], (faces[0], faces[0], faces[0]), told)
     values = np.stack([part for part, _ in parts], axis=-1)
     # A component that is zero everywhere may not be stored at all.
     stored = np.logical_or.reduce([active for _, active in parts])
