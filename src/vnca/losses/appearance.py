@@ -9,12 +9,12 @@ from jaxtyping import Float, Int
 from torch import Tensor
 from torch.nn import functional
 
-from vnca.colour import linear_to_srgb
 from vnca.errors import OptionError, ShapeError
 from vnca.features.vgg import STYLE_LAYERS, VGG16
 from vnca.losses.moments import Moments, moment_distance, moments
 from vnca.losses.pixels import luminance, palette_distance
 from vnca.losses.style import sample_positions, style_distance
+from vnca.render.colour import linear_to_srgb
 from vnca.typing import FloatArray
 
 
@@ -124,7 +124,7 @@ class AppearanceLoss:
         shorter = max(32, round(size * config.style_scale))
         self._generator = torch.Generator().manual_seed(self._seed)
         with torch.no_grad():
-            picture = _as_srgb(_resized(linear, shorter))
+            picture = linear_to_srgb(_resized(linear, shorter).clamp(0, 1))
             self._pixels = self._kept(_positions(picture)[0])
             self._layers = [
                 [self._described(maps) for maps in layer] for layer in self._features(picture)
@@ -240,8 +240,3 @@ def _resized(image: Tensor, shorter: int) -> Tensor:
     factor = shorter / min(rows, columns)
     size = (max(32, round(rows * factor)), max(32, round(columns * factor)))
     return functional.interpolate(image, size, mode="bilinear", antialias=True)
-
-
-def _as_srgb(linear: Tensor) -> Tensor:
-    encoded = linear_to_srgb(linear.clamp(0, 1).cpu().numpy())
-    return torch.from_numpy(encoded).to(linear)
