@@ -32,6 +32,8 @@ class RuleConfig:
     """Width of the hidden layer."""
     update_probability: float = 0.5
     """Chance of a cell to change in a step."""
+    steps_per_frame: int = 16
+    """Steps of the automaton between two frames; the rule is taught to move at this pace."""
     reach: int = 1
     """Cells live up to this far from the smoke; beyond is the outside that border cells see."""
     sobel_divisor: float = 32.0
@@ -52,6 +54,8 @@ class RuleConfig:
             raise OptionError(f"--hidden {self.hidden}: at least 1 is needed")
         if not 0 < self.update_probability <= 1:
             raise OptionError(f"--update-probability {self.update_probability}: must be in (0, 1]")
+        if self.steps_per_frame < 1:
+            raise OptionError(f"--steps-per-frame {self.steps_per_frame}: at least 1 is needed")
         if not 0 <= self.reach <= 64:
             raise OptionError(f"--reach {self.reach}: must be from 0 to 64 cells")
         if self.sobel_divisor <= 0 or self.laplacian_divisor <= 0:

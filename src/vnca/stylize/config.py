@@ -9,8 +9,8 @@ from vnca.errors import OptionError
 class StylizeConfig:
     """How a rule is rolled over a sequence, and how strongly it shows."""
 
-    steps_per_frame: int = 16
-    """Steps of the automaton between two frames."""
+    steps_per_frame: int | None = None
+    """Steps of the automaton between two frames; as many as in training unless given."""
     warmup: int = 64
     """Steps on the first frame before it is painted."""
     strength: float = 1.0
@@ -21,7 +21,7 @@ class StylizeConfig:
     """Same seed, same machine, same painting."""
 
     def __post_init__(self) -> None:
-        if self.steps_per_frame < 0 or self.warmup < 0:
+        if self.warmup < 0 or (self.steps_per_frame is not None and self.steps_per_frame < 0):
             raise OptionError("--steps-per-frame and --warmup must not be negative")
         for name in ("strength", "density_strength"):
             if not 0 <= getattr(self, name) <= 1:

@@ -56,6 +56,9 @@ def stylize(
             headers before the first frame is read.
     """
     box = box.grown(rule.config.reach)
+    pace = config.steps_per_frame
+    if pace is None:
+        pace = rule.config.steps_per_frame
     domain: Domain | None = None
     state = np.zeros((1, rule.config.channels), dtype=np.float32)
     steps_done = 0
@@ -72,9 +75,9 @@ def stylize(
             yield Painting(smoke, smoke.density, _unpainted(smoke))
             continue
         if domain is None:
-            state, steps = here.seed(rule.config.channels), config.warmup + config.steps_per_frame
+            state, steps = here.seed(rule.config.channels), config.warmup + pace
         else:
-            state, steps = domain.carry(state, here), config.steps_per_frame
+            state, steps = domain.carry(state, here), pace
         domain = here
         told = priors(domain, smoke, rule)
         for _ in range(steps):
