@@ -39,3 +39,7 @@ class BackendUnavailableError(VncaError):
 
 class OutputError(VncaError):
     """An output path cannot be written."""
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM: the user, or who looks after the machine, wants an end as with Ctrl-C."""

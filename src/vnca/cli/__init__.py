@@ -6,7 +6,8 @@ import sys
 from collections.abc import Sequence
 
 import vnca
-from vnca.errors import VncaError
+from vnca.cli.termination import terminable
+from vnca.errors import Terminated, VncaError
 
 COMMANDS = {
     "demo": "simulate, train, stylize and film a small plume, from nothing",
@@ -20,6 +21,8 @@ COMMANDS = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a subcommand; the exit code is 2 where the user can mend what went wrong.
+
+    Ctrl-C ends it with code 130, SIGTERM with 143.
 
     Each subcommand is a module of this package with a function `run(arguments)`. It is imported
     only when it is called, so that `vnca info` never waits for torch.
@@ -37,7 +40,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if name not in COMMANDS:
         return _failed(f"'{name}' is not a command; expected one of {', '.join(COMMANDS)}")
     try:
-        importlib.import_module(f"vnca.cli.{name}").run(rest)
+        with terminable():
+            importlib.import_module(f"vnca.cli.{name}").run(rest)
     except VncaError as error:
         return _failed(str(error))
     except ModuleNotFoundError as error:
@@ -46,9 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(f"'vnca {name}' needs {error.name}: pip install 'vnca[train]'")
     except MemoryError as error:
         return _failed(f"'vnca {name}' ran out of memory ({error}); give it less to hold at once")
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         print(file=sys.stderr)
-        return 130
+        return 143 if isinstance(stop, Terminated) else 130
     except BrokenPipeError:
         # The reader of our output went away, as `head` does; Python would complain at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
