@@ -96,7 +96,7 @@ def test_descending_the_loss_turns_a_flow_to_its_target() -> None:
         {"slowest": -0.1},
         {"size": 16},
         {"opacity_threshold": 1.0},
-        {"balance_every": 0},
+        {"balance_over": -1},
     ],
 )
 def test_options_out_of_range_are_named(bad) -> None:

@@ -16,7 +16,7 @@ _SMALLEST_SQUARE = 1e-12
 class MotionConfig:
     """What the seen motion is compared with, and how strongly."""
 
-    weight: float = 1.0
+    weight: float = 0.0
     """Weight of motion relative to the median appearance loss, λ; 0 leaves it out."""
     direction: float = 1.0
     """Weight of the direction, λ_dir."""
@@ -28,8 +28,8 @@ class MotionConfig:
     """Compare only where the smoke is at least this opaque."""
     slowest: float = 0.1
     """Compare only where the smoke moves by at least so many pixels a frame."""
-    balance_every: int = 25
-    """Iterations between measurements of the median appearance loss."""
+    balance_over: int = 25
+    """Iterations of which the median appearance loss is taken; with 0 the weight is absolute."""
 
     def __post_init__(self) -> None:
         for name in ("weight", "direction", "magnitude", "slowest"):
@@ -42,8 +42,8 @@ class MotionConfig:
                 f"--motion.opacity-threshold {self.opacity_threshold}: must be at least 0 and "
                 "below 1"
             )
-        if self.balance_every < 1:
-            raise OptionError(f"--motion.balance-every {self.balance_every}: at least 1 is needed")
+        if self.balance_over < 0:
+            raise OptionError(f"--motion.balance-over {self.balance_over}: must be 0 or more")
 
 
 class Motion(NamedTuple):

@@ -10,6 +10,7 @@ import tyro
 from vnca.automaton.rule import RuleConfig
 from vnca.errors import OptionError
 from vnca.losses.appearance import AppearanceConfig
+from vnca.losses.motion import MotionConfig
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,7 @@ class TrainConfig:
 
     rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = field(default_factory=RuleConfig)
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
+    motion: MotionConfig = field(default_factory=MotionConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     pool: PoolConfig = field(default_factory=PoolConfig)
     iterations: int = 400

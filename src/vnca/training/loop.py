@@ -12,17 +12,20 @@ import torch
 from torch import Tensor
 
 from vnca.automaton.rule import DENSITY_CHANGE, Rule, Scales
+from vnca.camera import Camera
+from vnca.features.flow import FlowNetwork
 from vnca.features.vgg import VGG16
 from vnca.kernels.update.backend import torch_step
 from vnca.kernels.update.mask import changing_rows
 from vnca.kernels.update.reference import Weights
 from vnca.kernels.update.stencil import stencil
 from vnca.losses.appearance import AppearanceLoss
+from vnca.losses.motion import Motion
 from vnca.losses.overflow import overflow
 from vnca.render.brightness import gamma_for_cell_opacity
 from vnca.render.colour import linear_to_srgb
-from vnca.render.view import View
 from vnca.training.config import TrainConfig
+from vnca.training.motion import MotionSupervision
 from vnca.training.pool import Pool
 from vnca.training.scene import Scene, density_scale, velocity_scale
 from vnca.typing import FloatArray
@@ -101,6 +104,9 @@ class Trainer:
         self._generator = torch.Generator().manual_seed(config.seed)
         self._pool = Pool(self.scene.seed(config.rule.channels), config.pool, self._random)
         self._optimiser = torch.optim.Adam(self._weights, lr=config.learning_rate)
+        self._motion = None
+        if config.motion.weight and self.scene.moves:
+            self._motion = MotionSupervision(config.motion, FlowNetwork.load(device))
         self._steps = 0  # of all rollouts: no two share a mask
 
     @property
@@ -121,14 +127,20 @@ class Trainer:
     def improve(self) -> Progress:
         """One iteration: rollout, picture, loss, gradient step."""
         config = self.config
-        place, state = self._pool.draw(self.iteration)
+        place, before = self._pool.draw(self.iteration)
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
-        state = self._roll(state, range(self._steps, self._steps + steps))
+        state = self._roll(before, range(self._steps, self._steps + steps))
         self._steps += steps
-        picture, opacity = self._picture(self._random_view(state))
+        camera, offset = self._random_viewpoint()
+        picture, opacity = self._picture(state, camera, offset)
         appearance = self._appearance(picture, opacity, self._generator)
-        penalty = config.overflow * self._overflow(state[:-1])
-        loss = appearance.total + penalty
+        others = {"overflow": config.overflow * self._overflow(state[:-1])}
+        if self._motion is not None and before.any():  # a state of zeros has no texture to move
+            others["motion"] = self._motion.weighted(
+                self._seen_motion(before, picture, camera, offset, steps),
+                float(appearance.total.detach()),
+            )
+        loss = appearance.total + torch.stack([*others.values()]).sum()
         kept = self._pool.put(place, state)
         self._optimiser.zero_grad()
         if bool(torch.isfinite(loss)):
@@ -137,11 +149,10 @@ class Trainer:
         self._optimiser.param_groups[0]["lr"] = self.learning_rate
         self._optimiser.step()
         self.iteration += 1
-        terms = {name: float(value.detach()) for name, value in appearance.terms.items()}
         return Progress(
             iteration=self.iteration,
             loss=float(loss.detach()),
-            terms={**terms, "overflow": float(penalty.detach())},
+            terms={k: float(v.detach()) for k, v in {**appearance.terms, **others}.items()},
             exploded=not kept,
         )
 
@@ -174,20 +185,32 @@ class Trainer:
         hidden, bias, output = (w.detach().cpu().numpy().copy() for w in self._weights)
         return dataclasses.replace(self._rule, hidden=hidden, bias=bias, output=output)
 
-    def _random_view(self, state: Tensor) -> View:
-        """The state from anywhere around the smoke."""
+    def _random_viewpoint(self) -> tuple[Camera, float]:
+        """A camera anywhere around the smoke, and where along the rays sampling begins."""
         view = self.config.view
         azimuth = self._random.uniform(0, 360)
         elevation = self._random.uniform(-view.elevation, view.elevation)
         # Samples at random depths: no pattern can hide between them.
         offset = float(self._random.uniform()) if view.mode == "sane" else 0.0
-        camera = self.scene.camera(azimuth, elevation)
-        return self.scene.look(state, camera, view, offset=offset)
+        return self.scene.camera(azimuth, elevation), offset
 
-    def _picture(self, view: View) -> tuple[Tensor, Tensor]:
-        """As the appearance loss wants it: sRGB `[1, 3, r, c]` and opacity `[1, r, c]`."""
+    def _picture(self, state: Tensor, camera: Camera, offset: float) -> tuple[Tensor, Tensor]:
+        """As the losses want it: sRGB `[1, 3, r, c]` and opacity `[1, r, c]`."""
+        view = self.scene.look(state, camera, self.config.view, offset=offset)
         picture = linear_to_srgb(view.over(self.background))
         return picture.permute(2, 0, 1)[None], view.opacity[None]
+
+    def _seen_motion(
+        self, before: Tensor, picture: Tensor, camera: Camera, offset: float, steps: int
+    ) -> Motion:
+        """How the texture moved in a rollout, against how the smoke moves in that time."""
+        assert self._motion is not None
+        view, size = self.config.view, min(self.config.motion.size, self.config.view.size)
+        with torch.no_grad():
+            earlier, _ = self._picture(before, camera, offset)
+        target, opacity = self.scene.motion(before, camera, view, size=size, offset=offset)
+        frames = steps / self.config.rule.steps_per_frame
+        return self._motion.compare(earlier, picture, target, opacity, frames=frames)
 
     @staticmethod
     def _overflow(cells: Tensor) -> Tensor:

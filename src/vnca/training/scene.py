@@ -10,6 +10,7 @@ from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THR
 from vnca.camera import Camera, Orthographic, Perspective, frame_box
 from vnca.errors import GridError
 from vnca.render.colour import srgb_to_linear
+from vnca.render.velocity import projected_velocity
 from vnca.render.view import View, render
 from vnca.training.config import ViewConfig
 from vnca.typing import AnyArray, Box
@@ -49,6 +50,10 @@ class Scene:
         self.priors = torch.from_numpy(priors(self.domain, smoke, rule)).to(device)
         density = self.domain.gather(smoke.density, smoke.origin) / rule.scales.density
         self._density = torch.from_numpy(density.astype(np.float32)).to(device)
+        self._velocity: Tensor | None = None
+        if smoke.velocity is not None:
+            velocity = self.domain.gather(smoke.velocity, smoke.origin).astype(np.float32)
+            self._velocity = torch.from_numpy(velocity).to(device)
         at = self.domain.cells - np.asarray(self.domain.box.lower)
         flat = np.ravel_multi_index(tuple(at.T), self.domain.box.shape)
         self._flat = torch.from_numpy(flat).to(device)
@@ -79,12 +84,10 @@ class Scene:
 
         `size` is that of the view unless given; `offset` shifts all samples along their rays.
         """
-        cells = state[:-1]
-        colour = srgb_to_linear((cells[:, COLOUR] + 0.5).clamp(0, 1))
-        change = cells[:, DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
+        colour = srgb_to_linear((state[:-1, COLOUR] + 0.5).clamp(0, 1))
         size = size or view.size
         return render(
-            self._dense(self._density * (1 + change)),
+            self._painted_density(state),
             self._dense(colour),
             camera,
             rows=size,
@@ -94,6 +97,37 @@ class Scene:
             offset=offset,
             mode=view.mode,
         )
+
+    def motion(
+        self, state: Tensor, camera: Camera, view: ViewConfig, *, size: int, offset: float = 0.0
+    ) -> tuple[Tensor, Tensor]:
+        """How the smoke that `look` shows moves: pixels per frame `[r, c, 2]`, and opacity.
+
+        Raises:
+            GridError: If the frame has no velocity.
+        """
+        if self._velocity is None:
+            raise GridError("the frame has no velocity: its motion cannot be seen")
+        return projected_velocity(
+            self._painted_density(state),
+            self._dense(self._velocity),
+            camera,
+            rows=size,
+            columns=size,
+            gamma=self.gamma,
+            step=view.step,
+            offset=offset,
+            mode=view.mode,
+        )
+
+    @property
+    def moves(self) -> bool:
+        """Whether the frame has a velocity."""
+        return self._velocity is not None
+
+    def _painted_density(self, state: Tensor) -> Tensor:
+        change = state[:-1, DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
+        return self._dense(self._density * (1 + change))
 
     def _dense(self, values: Tensor) -> Tensor:
         shape = self.domain.box.shape

@@ -1,0 +1,68 @@
+"""Motion supervision: the painted texture is taught to move as the smoke does.
+
+The density stays that of one frame while texture moves in it, so that nothing but the texture
+can be what an optical flow network sees moving.
+
+Reference: VNCA section 3.4, "Flow-guided Motion Supervision".
+"""
+
+import statistics
+from collections import deque
+
+from torch import Tensor
+from torch.nn import functional
+
+from vnca.features.flow import FlowNetwork
+from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss, supervised
+from vnca.losses.pixels import luminance
+
+
+class MotionSupervision:
+    """Judges how the pictures before and after a rollout differ.
+
+    Attributes:
+        config: What is compared, and how strongly.
+        appearance: The latest appearance losses, on which the weight of motion is balanced.
+    """
+
+    def __init__(self, config: MotionConfig, network: FlowNetwork) -> None:
+        """Prepare; `network` is frozen."""
+        self.config = config
+        self.appearance: deque[float] = deque(maxlen=config.balance_over)
+        self._network = network
+
+    def compare(
+        self,
+        before: Tensor,
+        after: Tensor,
+        target: Tensor,
+        opacity: Tensor,
+        *,
+        frames: float,
+    ) -> Motion:
+        """How far the motion seen between two pictures is from its target.
+
+        Differentiable in both pictures.
+
+        Args:
+            before: sRGB `[1, 3, r, c]` at the start of a rollout.
+            after: The same view at its end.
+            target: The smoke's projected velocity `[s, s, 2]`, pixels per frame.
+            opacity: Opacity of the same view `[s, s]`.
+            frames: Frames that pass in the rollout, n / N.
+        """
+        size = target.shape[0]
+        grey = (
+            functional.interpolate(luminance(picture)[:, :1], (size, size), mode="area")[:, 0]
+            for picture in (before, after)
+        )
+        seen = self._network(*grey)[0].permute(1, 2, 0) / frames
+        return compare_motion(seen, target, supervised(target, opacity, self.config))
+
+    def weighted(self, motion: Motion, appearance: float) -> Tensor:
+        """The motion loss, balanced against the appearance losses of the latest iterations."""
+        balance = 1.0
+        if self.config.balance_over:
+            self.appearance.append(appearance)
+            balance = statistics.median(self.appearance)
+        return self.config.weight * balance * motion_loss(motion, self.config)
