@@ -1,20 +1,25 @@
 """Output appears whole under its final name, or not at all."""
 
 import os
+import re
+import stat
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from vnca.errors import FileFormatError, OutputError
+
+_TEMPORARY = re.compile(r"\.(?P<stem>.+)\.unfinished-[a-z0-9_]{8}(?P<suffix>\.[^.]+)?")
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a temporary file beside `path`; rename it to `path` when the block succeeds.
 
-    The data is flushed to disk before the rename, so a crash leaves either the old file or
-    the new one. The temporary file keeps the suffix of `path`, for writers that look at it.
+    The data is flushed to disk before the rename, and the rename after it, so a crash or a loss
+    of power leaves either the old file or the new one, and the new one once this has returned.
+    The temporary file keeps the suffix of `path`, for writers that look at it.
 
     Raises:
         OutputError: If the folder cannot be made or written, or the disk is full.
@@ -23,7 +28,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(
-            prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent
+            prefix=f".{path.stem}.unfinished-", suffix=path.suffix, dir=path.parent
         )
         os.close(handle)
     except OSError as error:
@@ -31,17 +36,45 @@ def whole_file(path: Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        with temporary.open("rb") as file:
+        with temporary.open("r+b") as file:
             os.fsync(file.fileno())
         # mkstemp makes files private to the user; outputs get the usual permissions.
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
         temporary.replace(path)
+        _sync_folder(path.parent)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _sync_folder(folder: Path) -> None:
+    # Some platforms and network disks cannot: there, a rename lasts as soon as they see to it.
+    with suppress(OSError, AttributeError):
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def remove_leftovers(folder: Path, names: Collection[str]) -> None:
+    """Remove what a program that was killed while it wrote files of these names left in a folder.
+
+    Only temporary files of `whole_file` are; never while another program may be writing them.
+
+    Raises:
+        OutputError: If one cannot be removed.
+    """
+    try:
+        for file in folder.iterdir() if folder.is_dir() else ():
+            match = _TEMPORARY.fullmatch(file.name)
+            if match and match["stem"] + (match["suffix"] or "") in names:
+                file.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written ({error.strerror})") from error
 
 
 def writable_folder(path: Path) -> Path:
@@ -81,11 +114,16 @@ def existing_file(path: Path) -> Path:
         FileFormatError: If it is missing, a folder, empty or not readable.
     """
     path = Path(path)
-    if not path.exists():
-        raise FileFormatError(f"{path}: no such file")
-    if not path.is_file():
-        raise FileFormatError(f"{path}: expected a file, found a folder")
-    if path.stat().st_size == 0:
+    try:
+        status = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        raise FileFormatError(f"{path}: no such file") from None
+    except OSError as error:
+        raise FileFormatError(f"{path}: cannot be read ({error.strerror})") from error
+    if not stat.S_ISREG(status.st_mode):
+        found = "a folder" if stat.S_ISDIR(status.st_mode) else "something else"
+        raise FileFormatError(f"{path}: expected a file, found {found}")
+    if status.st_size == 0:
         raise FileFormatError(f"{path}: the file is empty")
     if not os.access(path, os.R_OK):
         raise FileFormatError(f"{path}: no permission to read it")

@@ -35,6 +35,12 @@ def test_frames_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     assert numbers(tmp_path / "s.1*.vdb") == [10, 11, 100]
 
 
+def test_hidden_files_are_no_frames(tmp_path: Path) -> None:
+    make(tmp_path, "s_0008.vdb", ".s_0008.unfinished-abcdef12.vdb", "._s_0008.vdb")
+    assert numbers(tmp_path) == [8]
+    assert numbers(tmp_path / "*") == [8]
+
+
 def test_padding_may_overflow_but_not_fall_short(tmp_path: Path) -> None:
     make(tmp_path, "s_9999.vdb", "s_10000.vdb", "s_12.vdb")
     assert numbers(tmp_path / "s_%04d.vdb") == [9999, 10000]

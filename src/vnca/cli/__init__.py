@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 
 import vnca
+from vnca.cli.progress import end_line
 from vnca.cli.termination import terminable
 from vnca.errors import Terminated, VncaError
 
@@ -60,6 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _failed(message: str) -> int:
+    end_line()
     # What a library says of a damaged file may have several lines.
     print("vnca:", " ".join(message.split()), file=sys.stderr)
     return 2

@@ -6,6 +6,8 @@ from typing import Any, TypeVar
 
 import tyro
 
+from vnca.cli.progress import end_line
+
 T = TypeVar("T")
 
 
@@ -30,5 +32,6 @@ def chosen(arguments: Sequence[str], option: str, default: str) -> str:
 
 
 def say(line: str) -> None:
-    """Tell the user something that is not the result: on standard error."""
+    """Tell the user something that is not the result: on standard error, on a line of its own."""
+    end_line()
     print(line, file=sys.stderr, flush=True)

@@ -11,6 +11,16 @@ T = TypeVar("T")
 _REDRAW_SECONDS = 0.2
 _LOG_SECONDS = 15.0
 
+_line_is_open = False
+
+
+def end_line() -> None:
+    """End the progress line a terminal shows, if any, so that what is printed next stands alone."""
+    global _line_is_open
+    if _line_is_open:
+        print(file=sys.stderr, flush=True)
+    _line_is_open = False
+
 
 class Progress:
     """A line on standard error that says how far work has come.
@@ -18,15 +28,16 @@ class Progress:
     Usable as a context manager, which ends the line.
     """
 
-    def __init__(self, what: str, total: int, unit: str) -> None:
+    def __init__(self, what: str, total: int, unit: str, *, already: int = 0) -> None:
         """Start the clock.
 
         Args:
             what: The work, as a present participle: "training".
             total: How many units there are.
             unit: What is counted, in the plural: "frames".
+            already: How many were finished before, which tell nothing of how fast it goes.
         """
-        self._what, self._total, self._unit = what, total, unit
+        self._what, self._total, self._unit, self._already = what, total, unit, already
         self._start = time.monotonic()
         self._drawn = -_LOG_SECONDS
         self._terminal = sys.stderr.isatty()
@@ -37,24 +48,26 @@ class Progress:
 
     def __exit__(self, *_: object) -> None:
         """End the line."""
-        if self._terminal and self._drawn > 0:
-            print(file=sys.stderr)
+        end_line()
 
     def show(self, done: int, note: str = "") -> None:
         """Say that `done` units are finished; `note` is added at the end of the line."""
+        global _line_is_open
         now = time.monotonic()
         pause = _REDRAW_SECONDS if self._terminal else _LOG_SECONDS
         if now - self._drawn < pause and done < self._total:
             return
         self._drawn = now
         elapsed = now - self._start
-        left = elapsed / done * (self._total - done) if done else 0.0
-        rate = f"{done / elapsed:.2f} {self._unit}/s" if done and elapsed > 0 else ""
+        fresh = max(0, done - self._already)
+        left = elapsed / fresh * (self._total - done) if fresh else 0.0
+        rate = f"{fresh / elapsed:.2f} {self._unit}/s" if fresh and elapsed > 0 else ""
         line = (
             f"{self._what} {done}/{self._total} {self._unit}  {rate}  {_clock(left)} left  {note}"
         )
         if self._terminal:
             print(f"\r\x1b[K{line.rstrip()}", end="", file=sys.stderr, flush=True)
+            _line_is_open = True
         else:
             print(line.rstrip(), file=sys.stderr, flush=True)
 

@@ -166,11 +166,14 @@ def _folder_sequences(folder: Path) -> dict[str, list[Frame]]:
 
 
 def _sequences(files: Iterable[Path]) -> dict[str, list[Frame]]:
-    """Numbered files, grouped by what they share, under the pattern that selects them."""
+    """Numbered files, grouped by what they share, under the pattern that selects them.
+
+    Hidden files are none: a program that was killed leaves such.
+    """
     groups: dict[tuple[str, str], list[Frame]] = {}
     for file in files:
         number = _trailing_number(file)
-        if number is not None and file.is_file():
+        if number is not None and not file.name.startswith(".") and file.is_file():
             prefix = _TRAILING.sub("", file.stem)
             groups.setdefault((prefix, file.suffix), []).append(Frame(number, file))
     return {
