@@ -41,5 +41,13 @@ class OutputError(VncaError):
     """An output path cannot be written."""
 
 
+class DivergenceError(VncaError):
+    """Training left the range of numbers, and lower learning rates did not help."""
+
+
+class OutOfMemoryError(VncaError):
+    """The work asked for does not fit into memory."""
+
+
 class Terminated(KeyboardInterrupt):
     """SIGTERM: the user, or who looks after the machine, wants an end as with Ctrl-C."""

@@ -78,7 +78,7 @@ def test_each_gradient_has_unit_length(trainer: Make) -> None:
     def look(*_: object) -> None:
         seen.extend(float(w.grad.norm()) for w in training._weights if w.grad is not None)
 
-    training._optimiser.register_step_pre_hook(look)
+    training._descent._adam.register_step_pre_hook(look)
     list(training.run())
     # W2 starts at zero, so nothing reaches the hidden layer in the first iteration.
     np.testing.assert_allclose([norm for norm in seen if norm > 0], 1, rtol=1e-5)

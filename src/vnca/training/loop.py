@@ -4,7 +4,7 @@ Reference: VNCA section 3.4.
 """
 
 import dataclasses
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from torch import Tensor
 
 from vnca.automaton.rule import DENSITY_CHANGE, Rule, Scales
 from vnca.camera import Camera
+from vnca.errors import DivergenceError
 from vnca.features.flow import FlowNetwork
 from vnca.features.vgg import VGG16
 from vnca.kernels.update.backend import torch_step
@@ -25,9 +26,11 @@ from vnca.losses.overflow import overflow
 from vnca.render.brightness import gamma_for_cell_opacity
 from vnca.render.colour import linear_to_srgb
 from vnca.training.config import TrainConfig
+from vnca.training.descent import MOST_RETREATS, Descent
 from vnca.training.motion import MotionSupervision
 from vnca.training.pool import Pool
 from vnca.training.scene import Scene, density_scale, velocity_scale
+from vnca.training.snapshot import Snapshot, count
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
@@ -41,12 +44,14 @@ class Progress:
         loss: The total that was minimised.
         terms: Its parts, weighted.
         exploded: Whether the state left the range and was thrown away.
+        diverged: Whether training went back to earlier weights, to go on at half the rate.
     """
 
     iteration: int
     loss: float
     terms: dict[str, float]
     exploded: bool
+    diverged: bool = False
 
 
 class Trainer:
@@ -103,11 +108,12 @@ class Trainer:
         self._random = np.random.default_rng(config.seed)
         self._generator = torch.Generator().manual_seed(config.seed)
         self._pool = Pool(self.scene.seed(config.rule.channels), config.pool, self._random)
-        self._optimiser = torch.optim.Adam(self._weights, lr=config.learning_rate)
+        self._descent = Descent(self._weights)
         self._motion = None
         if config.motion.weight and self.scene.moves:
             self._motion = MotionSupervision(config.motion, FlowNetwork.load(device))
         self._steps = 0  # of all rollouts: no two share a mask
+        self._before: dict[str, Snapshot] | None = None  # the iteration that is under way
 
     @property
     def background(self) -> Tensor:
@@ -117,15 +123,81 @@ class Trainer:
     @property
     def learning_rate(self) -> float:
         """Adam's learning rate in the next iteration."""
-        return self.config.rate(self.iteration)
+        return self.config.rate(self.iteration) * self._descent.slowdown
+
+    @property
+    def good_iteration(self) -> int:
+        """The iteration whose weights training goes back to when it diverges."""
+        return self._descent.kept_at
 
     def run(self) -> Iterator[Progress]:
-        """Train for the remaining iterations, one at a time."""
+        """Train for the remaining iterations, one at a time.
+
+        Raises:
+            DivergenceError: If training diverged and lower learning rates did not help. The
+                weights are then the last that were good.
+        """
         while self.iteration < self.config.iterations:
             yield self.improve()
 
     def improve(self) -> Progress:
-        """One iteration: rollout, picture, loss, gradient step."""
+        """One iteration: rollout, picture, loss, gradient step.
+
+        Raises:
+            DivergenceError: As `run` does.
+        """
+        self.undo()
+        if self._descent.is_exhausted:
+            raise DivergenceError(
+                f"training has diverged {MOST_RETREATS + 1} times, the last at iteration "
+                f"{self.iteration}, though the learning rate was halved each time; the weights of "
+                f"iteration {self.good_iteration} are kept: choose a --learning-rate far below "
+                f"{self.config.learning_rate:g}"
+            )
+        self._before = self.snapshot()
+        progress = self._improve()
+        self._before = None
+        return progress
+
+    def undo(self) -> None:
+        """Forget an iteration that was interrupted, as if it had not begun."""
+        if self._before is not None:
+            self.restore(self._before)
+
+    def snapshot(self) -> dict[str, Snapshot]:
+        """All that changes in training, by part, as it was after the last whole iteration."""
+        if self._before is not None:
+            return self._before
+        values = {
+            "iteration": self.iteration,
+            "steps": self._steps,
+            "random": self._random.bit_generator.state,
+        }
+        own = Snapshot({"generator": self._generator.get_state()}, values)
+        parts = {name: part.snapshot() for name, part in self._parts().items()}
+        return {"trainer": own, **parts}
+
+    def restore(self, snapshot: Mapping[str, Snapshot]) -> None:
+        """Go on from a snapshot of a trainer that was made of the same inputs.
+
+        Raises:
+            KeyError, RuntimeError, TypeError, ValueError: If it is not one.
+        """
+        own = snapshot["trainer"]
+        self.iteration = count(own.values["iteration"], "iteration", most=self.config.iterations)
+        self._steps = count(own.values["steps"], "steps")
+        self._random.bit_generator.state = own.values["random"]
+        self._generator.set_state(own.tensors["generator"])
+        for name, part in self._parts().items():
+            part.restore(snapshot[name])
+        self._before = None
+
+    def _parts(self) -> dict[str, Pool | Descent | MotionSupervision]:
+        """What remembers something from one iteration to the next."""
+        parts = {"pool": self._pool, "descent": self._descent}
+        return parts if self._motion is None else {**parts, "motion": self._motion}
+
+    def _improve(self) -> Progress:
         config = self.config
         place, before = self._pool.draw(self.iteration)
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
@@ -142,18 +214,15 @@ class Trainer:
             )
         loss = appearance.total + torch.stack([*others.values()]).sum()
         kept = self._pool.put(place, state)
-        self._optimiser.zero_grad()
-        if bool(torch.isfinite(loss)):
-            loss.backward()
-        self._normalise_gradients()
-        self._optimiser.param_groups[0]["lr"] = self.learning_rate
-        self._optimiser.step()
+        rate = config.rate(self.iteration)
         self.iteration += 1
+        went_on = self._descent.step(loss, rate, self.iteration, exploded=not kept)
         return Progress(
             iteration=self.iteration,
             loss=float(loss.detach()),
             terms={k: float(v.detach()) for k, v in {**appearance.terms, **others}.items()},
             exploded=not kept,
+            diverged=not went_on,
         )
 
     def grow(self, steps: int) -> Tensor:
@@ -216,16 +285,6 @@ class Trainer:
     def _overflow(cells: Tensor) -> Tensor:
         """States beyond ±1, and beyond ±½ where they are shown: a clamped colour learns nothing."""
         return overflow(cells) + overflow(2 * cells[:, : DENSITY_CHANGE + 1])
-
-    def _normalise_gradients(self) -> None:
-        """Give each gradient unit length: rollouts of any length then teach equally much.
-
-        One that is not finite is dropped, and its weight stays as it is in this iteration.
-        """
-        for weight in self._weights:
-            if weight.grad is not None:
-                norm = weight.grad.norm()
-                weight.grad = weight.grad / (norm + 1e-8) if bool(norm.isfinite()) else None
 
 
 def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:

@@ -6,6 +6,7 @@ can be what an optical flow network sees moving.
 Reference: VNCA section 3.4, "Flow-guided Motion Supervision".
 """
 
+import math
 import statistics
 from collections import deque
 
@@ -15,6 +16,7 @@ from torch.nn import functional
 from vnca.features.flow import FlowNetwork
 from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss, supervised
 from vnca.losses.pixels import luminance
+from vnca.training.snapshot import Snapshot
 
 
 class MotionSupervision:
@@ -61,8 +63,22 @@ class MotionSupervision:
 
     def weighted(self, motion: Motion, appearance: float) -> Tensor:
         """The motion loss, balanced against the appearance losses of the latest iterations."""
-        balance = 1.0
-        if self.config.balance_over:
+        if math.isfinite(appearance):
             self.appearance.append(appearance)
-            balance = statistics.median(self.appearance)
+        balance = statistics.median(self.appearance) if self.appearance else 1.0
         return self.config.weight * balance * motion_loss(motion, self.config)
+
+    def snapshot(self) -> Snapshot:
+        """The losses on which the weight is balanced."""
+        return Snapshot(values={"appearance": list(self.appearance)})
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot.
+
+        Raises:
+            KeyError, TypeError, ValueError: If it is not one of motion supervision.
+        """
+        losses = [float(loss) for loss in snapshot.values["appearance"]]
+        if not all(map(math.isfinite, losses)):
+            raise ValueError("appearance: not all finite")
+        self.appearance = deque(losses, maxlen=self.config.balance_over)

@@ -7,6 +7,7 @@ import numpy as np
 from torch import Tensor
 
 from vnca.training.config import PoolConfig
+from vnca.training.snapshot import Snapshot, count, matched
 
 
 class Pool:
@@ -29,9 +30,30 @@ class Pool:
     def put(self, place: int, state: Tensor) -> bool:
         """Return a state; False if it had exploded and was replaced by the seed."""
         state = state.detach()
-        # A NaN fails the comparison and so counts as exploded.
-        if not bool(state.abs().max() <= self._config.limit):
+        if not self._is_sound(state):
             self._states.pop(place, None)
             return False
         self._states[place] = state
         return True
+
+    def snapshot(self) -> Snapshot:
+        """The states that are not the seed, by place; not copied, for none is ever changed."""
+        return Snapshot({str(place): state for place, state in self._states.items()})
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Hold the states of a snapshot; which are drawn is up to the random stream.
+
+        Raises:
+            ValueError: If it is not one of such a pool.
+        """
+        states = {}
+        for name, state in snapshot.tensors.items():
+            place = count(int(name), "place", most=self._config.size - 1)
+            states[place] = matched(state, self._seed, f"state {name}")
+            if not self._is_sound(state):
+                raise ValueError(f"state {name}: beyond the limit")
+        self._states = states
+
+    def _is_sound(self, state: Tensor) -> bool:
+        # A NaN fails the comparison.
+        return bool(state.abs().max() <= self._config.limit)
