@@ -72,9 +72,21 @@ def remove_leftovers(folder: Path, names: Collection[str]) -> None:
         for file in folder.iterdir() if folder.is_dir() else ():
             match = _TEMPORARY.fullmatch(file.name)
             if match and match["stem"] + (match["suffix"] or "") in names:
-                file.unlink(missing_ok=True)
+                remove_file(file)
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be written ({error.strerror})") from error
+        raise OutputError(f"{folder}: cannot be listed ({error.strerror})") from error
+
+
+def remove_file(path: Path) -> None:
+    """Remove a file if it is there.
+
+    Raises:
+        OutputError: If it cannot be removed.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be removed ({error.strerror})") from error
 
 
 def writable_folder(path: Path) -> Path:

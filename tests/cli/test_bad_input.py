@@ -45,7 +45,7 @@ def no_long_work(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(VGG16, "load", begin)
     monkeypatch.setattr(Trainer, "improve", begin)
-    monkeypatch.setattr("vnca.cli.stylize.stylize", begin)
+    monkeypatch.setattr("vnca.stylize.roll.Roll.paint", begin)
     monkeypatch.setattr("vnca.cli.render.read_colour", begin)
 
 

@@ -5,11 +5,12 @@ from functools import partial
 from pathlib import Path
 
 from vnca.cli.options import say
-from vnca.errors import SequenceError
+from vnca.errors import SequenceError, VncaError
 from vnca.files import existing_file
 from vnca.io.sequence import FrameSequence, find_frames, format_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, with_fitted_scale
 from vnca.stylize.ahead import read_ahead
+from vnca.stylize.painter import BROKEN
 from vnca.typing import Box
 from vnca.volume import Volume
 
@@ -44,21 +45,43 @@ def beside(path: Path, smoke: SmokeFormat) -> SmokeFormat:
     return with_fitted_scale(smoke, frames[max(0, places[0] - 1) : places[0] + 2])
 
 
-def sequence_box(sequence: FrameSequence, smoke: SmokeFormat) -> Box:
+def sequence_box(
+    sequence: FrameSequence, smoke: SmokeFormat, *, without_broken: bool = False
+) -> Box:
     """The box that holds the smoke of all frames, from the files' headers where they tell.
+
+    Args:
+        sequence: The frames.
+        smoke: How they are read.
+        without_broken: Pass over frames that cannot be read, unless none can.
 
     Raises:
         SequenceError: If no frame has smoke.
+        FileFormatError: If a frame cannot be read.
+        GridError: If one has no smoke to read.
     """
-    box = Box((0, 0, 0), (0, 0, 0))
+    box, broken = Box((0, 0, 0), (0, 0, 0)), 0
     for frame in sequence:
-        box = box.union(smoke_box(frame.path, smoke))
+        found = _box_or_error(frame.path, smoke)
+        if isinstance(found, Box):
+            box = box.union(found)
+            continue
+        broken += 1
+        if broken == len(sequence) or not without_broken:
+            raise found
     if box.is_empty:
         raise SequenceError(
             f"{sequence[0].path.parent}: there is no smoke in any frame; "
             "choose others with --frames or another grid with --density-grid"
         )
     return box
+
+
+def _box_or_error(path: Path, smoke: SmokeFormat) -> Box | VncaError:
+    try:
+        return smoke_box(path, smoke)
+    except BROKEN as error:
+        return error
 
 
 def volumes(sequence: FrameSequence, smoke: SmokeFormat) -> Iterator[Volume]:

@@ -1,8 +1,10 @@
 """`vnca stylize MODEL SEQUENCE --out DIR`."""
 
 import dataclasses
+import hashlib
+import json
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -10,18 +12,27 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+import vnca
 from vnca.automaton.model import Model
+from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
 from vnca.cli.film import Film, FilmConfig
 from vnca.cli.options import parse, say
-from vnca.cli.progress import tracked
-from vnca.cli.sequence import open_sequence, sequence_box, volumes
+from vnca.cli.progress import Progress
+from vnca.cli.sequence import open_sequence, sequence_box
+from vnca.cli.termination import finishing
 from vnca.errors import ModelError, OptionError
-from vnca.files import writable_file, writable_folder
-from vnca.io.smoke import SmokeFormat, with_fitted_scale, write_painted
+from vnca.files import remove_leftovers, writable_file, writable_folder
+from vnca.io.painted import read_colour
+from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
+from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.io.video import SUFFIXES as FILMS
+from vnca.kernels.update.backend import choose
 from vnca.stylize.config import StylizeConfig
-from vnca.stylize.roll import stylize
+from vnca.stylize.painter import OnError, Painter
+from vnca.stylize.roll import Roll
+from vnca.typing import FloatArray
+from vnca.volume import Volume
 
 
 @dataclass(frozen=True)
@@ -46,6 +57,10 @@ class Stylize:
     """Density that counts as 1; that of the training frame unless given."""
     backend: Literal["auto", "native", "reference"] = "auto"
     """What computes the automaton."""
+    resume: bool = False
+    """Go on with a painting that was ended before its last frame, to the very same files."""
+    on_error: OnError = "stop"
+    """With a frame that cannot be read: stop, skip it, or hold the smoke of the one before."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: Annotated[StylizeConfig, tyro.conf.arg(name="")] = field(default_factory=StylizeConfig)
@@ -73,12 +88,13 @@ class Stylize:
 def run(arguments: Sequence[str]) -> None:
     """Read the options and paint; smoke is read as it was for training unless told otherwise."""
     options = parse("stylize", Stylize, arguments)
-    recorded = Model.load(options.model).training.get("smoke")
+    model = Model.load(options.model)
+    recorded = model.training.get("smoke")
     if recorded:
         missing: Any = tyro.MISSING
         defaults = Stylize(missing, missing, missing, smoke=_recorded(options.model, recorded))
         options = parse("stylize", Stylize, arguments, default=defaults)
-    paint(options)
+    paint(options, model)
 
 
 def _recorded(model: Path, smoke: Any) -> SmokeFormat:
@@ -88,56 +104,109 @@ def _recorded(model: Path, smoke: Any) -> SmokeFormat:
         raise ModelError(f"{model}: damaged model metadata (smoke: {error})") from error
 
 
-def paint(options: Stylize) -> None:
+def paint(options: Stylize, model: Model | None = None) -> None:
     """Paint as asked, streaming: memory does not grow with the length of the sequence.
+
+    Args:
+        options: What to paint, and how.
+        model: The model of the options, if it is loaded already.
 
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
-    model = Model.load(options.model)
-    scales = model.rule.scales
+    rule = (model or Model.load(options.model)).rule
     scales = dataclasses.replace(
-        scales,
-        density=options.density_scale or scales.density,
-        gamma=options.gamma or scales.gamma,
+        rule.scales,
+        density=options.density_scale or rule.scales.density,
+        gamma=options.gamma or rule.scales.gamma,
     )
-    rule = dataclasses.replace(model.rule, scales=scales)
+    rule = dataclasses.replace(rule, scales=scales)
     sequence = open_sequence(options.sequence, options.frames)
     writable_folder(options.out)
     if options.preview:
         writable_file(options.preview)
+        remove_leftovers(options.preview.parent, [options.preview.name])
     if any(f.path.resolve().parent == options.out.resolve() for f in sequence):
         raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
     smoke = with_fitted_scale(options.smoke, sequence)
-    box = sequence_box(sequence, smoke)
-    paintings = stylize(
-        volumes(sequence, smoke),
-        rule,
-        stepper(rule, options.backend),
-        options.config,
-        box=box,
+    box = sequence_box(sequence, smoke, without_broken=options.on_error != "stop")
+    backend = choose(options.backend)
+    painter = Painter(
+        sequence,
+        options.out,
+        Roll(rule, stepper(rule, backend), options.config, box),
+        smoke,
+        options.colour_grid,
+        options.on_error,
+        conditions={
+            "the version of vnca": vnca.__version__,
+            "the model": _digest(rule),
+            "the list of frames": [frame.path.name for frame in sequence],
+            "the box of the smoke": box,
+            "--backend": backend,
+            "--density-scale": scales.density,
+            "--colour-grid": options.colour_grid,
+            **{
+                f"--{name.replace('_', '-')}": value
+                for values in (options.config, smoke)
+                for name, value in dataclasses.asdict(values).items()
+            },
+        },
+        tell=say,
     )
+    _paint(painter, options)
+    say(f"painted: {options.out}")
+    if options.preview:
+        say(f"film: {options.preview}")
+
+
+def _digest(rule: Rule) -> str:
+    """Equal for rules that paint equally."""
+    shape = dataclasses.asdict(rule.config)
+    digest = hashlib.blake2b(json.dumps([shape, rule.scales.velocity]).encode(), digest_size=16)
+    for weights in (rule.hidden, rule.bias, rule.output):
+        digest.update(weights.tobytes())
+    return digest.hexdigest()
+
+
+def _paint(painter: Painter, options: Stylize) -> None:
+    """Paint to the end, to Ctrl-C or, once a frame is finished, to SIGTERM."""
+    sequence, scales = painter.sequence, painter.roll.rule.scales
+    finished = 0
     with ExitStack() as stack:
         film = None
         if options.preview is not None:
             film = stack.enter_context(
-                Film(options.preview, options.film, box, frames=len(sequence))
+                Film(options.preview, options.film, painter.roll.box, frames=len(sequence))
             )
-        for painting, frame in zip(
-            tracked(paintings, "painting", len(sequence), "frames"), sequence, strict=True
-        ):
-            write_painted(
-                options.out / f"{frame.path.stem}.vdb",
-                frame.path,
-                options.smoke,
-                density=painting.density,
-                colour=painting.colour,
-                box=painting.smoke.box,
-                colour_grids=options.colour_grid,
-            )
-            if film is not None:
-                gamma = scales.gamma / scales.density
-                film.add(painting.density, painting.colour, painting.smoke.origin, gamma=gamma)
-    say(f"painted: {options.out}")
-    if options.preview:
-        say(f"film: {options.preview}")
+        unfinished = painter.begin(resume=options.resume)
+        already = len(unfinished.sources)
+        try:
+            with (
+                Progress("painting", len(sequence), "frames", already=already) as progress,
+                finishing() as stop_if_asked,
+                closing(painter.paint(unfinished)) as paths,
+            ):
+                for finished, (frame, path) in enumerate(zip(sequence, paths, strict=True), 1):
+                    if film is not None and path is not None:
+                        # As the file has it, so that a film is the same with and without --resume.
+                        smoke, colour = _read_painted(path, frame.path, options)
+                        gamma = scales.gamma / scales.density
+                        film.add(smoke.density, colour, smoke.origin, gamma=gamma)
+                    progress.show(finished)
+                    stop_if_asked()
+        except KeyboardInterrupt:
+            done = max(already, finished)
+            say(f"stopped after {done} of {len(sequence)} frames; --resume goes on")
+            raise
+    painter.discard()
+
+
+def _read_painted(path: Path, source: Path, options: Stylize) -> tuple[Volume, FloatArray]:
+    """Smoke and colour of a painted frame."""
+    up = up_axis_of(source, options.smoke)
+    format = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY, up_axis=up)
+    smoke = read_smoke(path, format)
+    colour = read_colour(path, format, grid=options.colour_grid[0], box=smoke.box)
+    assert colour is not None, "it was written a moment ago"
+    return smoke, colour

@@ -106,11 +106,12 @@ def smoke_box(path: Path, format: SmokeFormat) -> Box:
 def with_fitted_scale(format: SmokeFormat, frames: Sequence[Frame]) -> SmokeFormat:
     """`format` with a number in place of `velocity_scale="fit"`; otherwise as it is.
 
-    The number is the median over a few pairs of neighbouring frames.
+    The number is the median over a few pairs of neighbouring frames that can be read.
 
     Raises:
         SequenceError: If no two frames are neighbours.
         GridError: If no pair has a fit.
+        FileFormatError: If no pair can be read.
     """
     if format.velocity_scale != "fit":
         return format
@@ -120,10 +121,10 @@ def with_fitted_scale(format: SmokeFormat, frames: Sequence[Frame]) -> SmokeForm
     unscaled = replace(format, velocity_scale=1.0)
     scales, failure = [], None
     for chosen in np.unique(np.linspace(0, len(pairs) - 1, _FITTED_PAIRS).round().astype(int)):
-        volumes = [read_smoke(path, unscaled, frame=number) for number, path in pairs[chosen]]
         try:
+            volumes = [read_smoke(path, unscaled, frame=number) for number, path in pairs[chosen]]
             scales.append(fit_velocity_scale(*volumes))
-        except GridError as error:
+        except (GridError, FileFormatError) as error:
             failure = error
     if failure is not None and not scales:
         raise failure

@@ -19,11 +19,33 @@ from vnca.automaton.rule import SMOKE_THRESHOLD, Rule
 from vnca.automaton.stepper import Step
 from vnca.kernels.update.mask import changing_rows
 from vnca.stylize.config import StylizeConfig
-from vnca.typing import Box, FloatArray
+from vnca.typing import Box, FloatArray, IntArray
 from vnca.volume import Volume
 
 UNPAINTED = 1.0
 """Linear colour of smoke that the rule does not paint: white."""
+
+
+@dataclass(frozen=True, eq=False)
+class RollState:
+    """What a frame leaves to the next: all it takes to go on from there.
+
+    Attributes:
+        cells: `[n, 3]` index coordinates of the cells alive; none before the first frame and after
+            one without smoke.
+        values: `[n + 1, C]`, their state and a last row of zeros.
+        steps_done: Steps since the sequence began, by which the next ones are numbered.
+    """
+
+    cells: IntArray
+    values: FloatArray
+    steps_done: int = 0
+
+    @classmethod
+    def empty(cls, channels: int, steps_done: int = 0) -> "RollState":
+        """That of nothing painted yet."""
+        cells = np.zeros((0, 3), dtype=np.int32)
+        return cls(cells, np.zeros((1, channels), dtype=np.float32), steps_done)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,75 +56,96 @@ class Painting:
         smoke: The frame as it was read.
         density: `[x, y, z]`, painted, in the units of the file.
         colour: Linear RGB `[x, y, z, 3]`; white where the rule does not reach.
+        state: What it leaves to the next frame.
     """
 
     smoke: Volume
     density: FloatArray
     colour: FloatArray
+    state: RollState
 
 
-def stylize(
-    frames: Iterable[Volume], rule: Rule, step: Step, config: StylizeConfig, *, box: Box
-) -> Iterator[Painting]:
-    """Paint a sequence frame by frame.
+@dataclass(frozen=True, eq=False)
+class Roll:
+    """A rule made ready for a sequence.
 
-    Args:
-        frames: In order; read one at a time. A frame without smoke passes through, and the
-            painting starts afresh after it.
+    Attributes:
         rule: The trained rule.
         step: The kernel that applies it.
         config: How.
         box: Holds the smoke of all frames; gives cells their position. Known from the files'
             headers before the first frame is read.
     """
-    box = box.grown(rule.config.reach)
-    pace = config.steps_per_frame
-    if pace is None:
-        pace = rule.config.steps_per_frame
-    domain: Domain | None = None
-    state = np.zeros((1, rule.config.channels), dtype=np.float32)
-    steps_done = 0
-    for smoke in frames:
-        here = Domain.around_smoke(
+
+    rule: Rule
+    step: Step
+    config: StylizeConfig
+    box: Box
+
+    def start(self) -> RollState:
+        """The state before the first frame."""
+        return RollState.empty(self.rule.config.channels)
+
+    def paint(self, smoke: Volume, state: RollState) -> Painting:
+        """The next frame, from the state that the one before it left.
+
+        A frame without smoke passes through, and the painting starts afresh after it.
+        """
+        rule, config = self.rule, self.config
+        box = self.box.grown(rule.config.reach)
+        domain = Domain.around_smoke(
             smoke.density,
             smoke.origin,
             threshold=SMOKE_THRESHOLD * rule.scales.density,
             reach=rule.config.reach,
             box=box,
         )
-        if len(here) == 0:
-            domain = None
-            yield Painting(smoke, smoke.density, _unpainted(smoke))
-            continue
-        if domain is None:
-            state, steps = here.seed(rule.config.channels), config.warmup + pace
+        if len(domain) == 0:
+            state = RollState.empty(rule.config.channels, state.steps_done)
+            return Painting(smoke, smoke.density, _unpainted(smoke), state)
+        steps = config.steps_per_frame
+        if steps is None:
+            steps = rule.config.steps_per_frame
+        if len(state.cells) == 0:
+            values, steps = domain.seed(rule.config.channels), config.warmup + steps
         else:
-            state, steps = domain.carry(state, here), pace
-        domain = here
+            values = Domain(state.cells, box).carry(state.values, domain)
         told = priors(domain, smoke, rule)
-        for _ in range(steps):
+        done = state.steps_done + steps
+        for number in range(state.steps_done, done):
             rows = changing_rows(
                 domain.hashes,
                 seed=config.seed,
-                step=steps_done,
+                step=number,
                 probability=rule.config.update_probability,
             )
-            state = step(state, rows, domain.neighbours, told)
-            steps_done += 1
-        yield paint(smoke, domain, state, config)
+            values = self.step(values, rows, domain.neighbours, told)
+        return _shown(smoke, RollState(domain.cells, values, done), config)
 
 
-def paint(smoke: Volume, domain: Domain, state: FloatArray, config: StylizeConfig) -> Painting:
+def stylize(
+    frames: Iterable[Volume], rule: Rule, step: Step, config: StylizeConfig, *, box: Box
+) -> Iterator[Painting]:
+    """Paint a sequence frame by frame, reading one at a time; see `Roll` for the arguments."""
+    roll = Roll(rule, step, config, box)
+    state = roll.start()
+    for smoke in frames:
+        painting = roll.paint(smoke, state)
+        state = painting.state
+        yield painting
+
+
+def _shown(smoke: Volume, state: RollState, config: StylizeConfig) -> Painting:
     """The frame as a state shows it."""
     colour = _unpainted(smoke)
     density = smoke.density.copy()
-    at = domain.cells - np.asarray(smoke.origin, dtype=np.int32)
+    at = state.cells - np.asarray(smoke.origin, dtype=np.int32)
     inside = ((at >= 0) & (at < smoke.density.shape)).all(axis=1)
     where = tuple(at[inside].T)
-    cells = state[:-1][inside]
+    cells = state.values[:-1][inside]
     colour[where] += config.strength * (colours(cells) - UNPAINTED)
     density[where] *= density_factors(cells, strength=config.density_strength)
-    return Painting(smoke, density, colour)
+    return Painting(smoke, density, colour, state)
 
 
 def _unpainted(smoke: Volume) -> FloatArray:
