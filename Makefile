@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo test test-slow check format lock bench clean
+.PHONY: setup demo test test-slow test-faults check format lock bench clean
 
 setup: $(READY)
 
@@ -27,6 +27,9 @@ test: setup
 
 test-slow: setup
 	$(BIN)/pytest -m slow
+
+test-faults: setup
+	$(BIN)/pytest -m faults tests/faults
 
 check: setup
 	$(BIN)/ruff format --check .
