@@ -9,6 +9,7 @@ the second picture moved back by what the coarser ones found, and adds the rest.
 """
 
 from importlib import resources
+from math import cos, pi, sin
 from pathlib import Path
 
 import torch
@@ -40,6 +41,7 @@ class FlowNetwork(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.filters = nn.Conv2d(2, _ENERGIES, _KERNEL, stride=2, bias=False)
+        self.filters.weight.data = _moving_gratings()
         self.first = nn.Conv2d(_ENERGIES + 1 + _HIDDEN + 2, _WIDTH, 3, padding=1)
         self.second = nn.Conv2d(_WIDTH, _HIDDEN, 3, padding=1)
         self.rest = nn.Conv2d(_HIDDEN, 2, 3, padding=1)
@@ -155,6 +157,26 @@ class FlowNetwork(nn.Module):
         )
         total = energy.sum(dim=1, keepdim=True) + _STILL
         return torch.cat([_ENERGIES * energy / total, total.log()], dim=1)
+
+
+def _moving_gratings() -> Tensor:
+    """What the filters are before training: gratings that move, in pairs a quarter apart.
+
+    Eight directions of two wavelengths in turn, each with four steps of phase between the
+    pictures. From random filters training finds such ones too, but slowly.
+    """
+    along = torch.arange(_KERNEL) - (_KERNEL - 1) / 2
+    window = torch.exp(-(along.square() + along[:, None].square()) / (2 * 2.5**2))
+    filters: list[Tensor] = []
+    for direction in range(8):
+        angle, wavenumber = pi * direction / 8, 2 * pi / (4.5, 8.0)[direction % 2]
+        phase = wavenumber * (along * cos(angle) + along[:, None] * sin(angle))
+        for step in range(4):
+            for quarter in range(2):
+                start = phase + pi / 2 * quarter
+                pair = torch.stack([start.cos(), (start - pi / 2 * step).cos()]) * window
+                filters.append(pair - pair.mean(dim=(1, 2), keepdim=True))
+    return torch.stack(filters) / _KERNEL
 
 
 def _normalised(pair: Tensor) -> Tensor:

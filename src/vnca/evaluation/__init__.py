@@ -1,0 +1,1 @@
+"""How well a texture is painted and moves, in numbers."""

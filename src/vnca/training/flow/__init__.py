@@ -1,0 +1,1 @@
+"""Training of the optical flow network, on synthetic motion; see `docs/flow.md`."""
