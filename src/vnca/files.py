@@ -47,7 +47,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # A disk that is gone takes the temporary file with it.
+            temporary.unlink(missing_ok=True)
 
 
 def _sync_folder(folder: Path) -> None:

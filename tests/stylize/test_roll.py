@@ -9,7 +9,7 @@ from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import OptionError
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.config import StylizeConfig
-from vnca.stylize.roll import Painting, stylize
+from vnca.stylize.roll import Painting, Roll, stylize
 from vnca.typing import Box, FloatArray, IntArray
 from vnca.volume import Volume
 
@@ -88,6 +88,16 @@ def test_same_seed_same_painting_and_another_seed_another() -> None:
     a, b = rolled([ball(0)]), rolled([ball(0)])
     np.testing.assert_array_equal(a[0].colour, b[0].colour)
     assert not np.array_equal(a[0].colour, rolled([ball(0)], seed=1)[0].colour)
+
+
+def test_a_roll_goes_on_from_the_state_a_painting_left() -> None:
+    frames = [ball(0), ball(1, (2, 0, 0)), nothing(2), ball(3)]
+    whole = rolled(frames)
+    roll = Roll(RULE, counting_step, StylizeConfig(warmup=6, steps_per_frame=2), BOX)
+    for before, after in zip(whole, whole[1:], strict=False):
+        again = roll.paint(after.smoke, before.state)
+        np.testing.assert_array_equal(again.colour, after.colour)
+        assert again.state.steps_done == after.state.steps_done
 
 
 def test_frames_are_read_one_at_a_time() -> None:

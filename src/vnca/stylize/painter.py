@@ -108,9 +108,6 @@ class Painter:
         loads = (partial(self._read, at) for at in range(start, len(self.sequence)))
         try:
             for frame, read in zip(self.sequence[start:], read_ahead(loads), strict=True):
-                if not sources:
-                    # What follows overwrites the frames of an earlier painting.
-                    self.discard()
                 held, state, source = self._finish(frame, read, held, state)
                 sources.append(source)
                 if time.monotonic() >= due:
@@ -150,6 +147,9 @@ class Painter:
     def _write(self, frame: Frame, read: _Read, state: RollState) -> RollState:
         """Paint smoke to the file of a frame; the state after it."""
         painting = self.roll.paint(read.smoke, state)
+        if frame == self.sequence[0]:
+            # From here on, frames of an earlier painting are overwritten.
+            self.discard()
         write_painted(
             self.target(frame),
             read.frame.path,
