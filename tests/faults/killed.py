@@ -8,7 +8,8 @@ The moments of writing come again and again; NUMBER says at which of them, from 
     written   it is written whole, and not under its name yet
     renamed   it is under its name
     seconds   so long after the command began, wherever it is
-    never     not at all: how often each moment came and how long it took is printed as JSON
+    never     not at all: how often each moment came, how long it took, and the most memory it
+              had at a time is printed as JSON
 """
 
 import json
@@ -55,6 +56,13 @@ def renamed(self: Path, target: Path) -> Path:
     return result
 
 
+def peak_kib() -> int:
+    """The most memory this program had at a time; what getrusage tells begins with its parent's."""
+    status = Path("/proc/self/status")
+    words = status.read_text().split() if status.exists() else ["VmHWM:", "0"]
+    return int(words[words.index("VmHWM:") + 1])
+
+
 os.fsync, Path.replace = synced, renamed  # type: ignore[assignment]
 import_module(f"vnca.cli.{command[0]}")
 begun = time.monotonic()
@@ -64,5 +72,5 @@ if moment == "seconds":
     timer.start()
 code = import_module("vnca.cli").main(command)
 if moment == "never":
-    print(json.dumps({**counts, "seconds": time.monotonic() - begun}))
+    print(json.dumps({**counts, "seconds": time.monotonic() - begun, "peak_kib": peak_kib()}))
 sys.exit(code)

@@ -1,5 +1,6 @@
 import dataclasses
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -94,7 +95,7 @@ def test_a_roll_goes_on_from_the_state_a_painting_left() -> None:
     frames = [ball(0), ball(1, (2, 0, 0)), nothing(2), ball(3)]
     whole = rolled(frames)
     roll = Roll(RULE, counting_step, StylizeConfig(warmup=6, steps_per_frame=2), BOX)
-    for before, after in zip(whole, whole[1:], strict=False):
+    for before, after in pairwise(whole):
         again = roll.paint(after.smoke, before.state)
         np.testing.assert_array_equal(again.colour, after.colour)
         assert again.state.steps_done == after.state.steps_done
