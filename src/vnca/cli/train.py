@@ -1,4 +1,4 @@
-"""`vnca train FRAME STYLE --out RUN`."""
+"""`vnca train FRAME STYLE --out RUN`, and `vnca train --resume RUN`."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -9,14 +9,16 @@ from typing import Annotated, Any, Literal
 import torch
 import tyro
 
-from vnca.automaton.model import Model
+from vnca.automaton.model import MODEL_NAME, Model
 from vnca.cli.options import chosen, parse, say
 from vnca.cli.progress import Progress
+from vnca.cli.recorded import recorded, restored
 from vnca.cli.sequence import beside
-from vnca.errors import GridError, OptionError
+from vnca.errors import DivergenceError, FileFormatError, GridError, OptionError, VncaError
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image, resize, to_srgb8
 from vnca.io.smoke import SmokeFormat, read_smoke
+from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.loop import Trainer
 from vnca.training.preview import preview_sheet
@@ -29,7 +31,10 @@ THUMBNAIL = 96
 
 @dataclass(frozen=True)
 class Train:
-    """Learn a rule from one frame of smoke and one picture."""
+    """Learn a rule from one frame of smoke and one picture.
+
+    `vnca train --resume RUN` goes on with a training that was interrupted.
+    """
 
     frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
@@ -55,8 +60,23 @@ class Train:
             raise OptionError(f"--preview-every {self.preview_every}: at least 1 is needed")
 
 
+@dataclass(frozen=True)
+class Resume:
+    """Go on with a training that was interrupted, as if it had not been."""
+
+    resume: Path
+    """Folder of the run. All that was asked for when it began holds."""
+    frame: Path | None = None
+    """The frame, if it is no longer where it was."""
+    style: Path | None = None
+    """The picture, if it is no longer where it was."""
+
+
 def run(arguments: Sequence[str]) -> None:
-    """Read the options and train."""
+    """Read the options and train, or go on with a training."""
+    if any(word.partition("=")[0] == "--resume" for word in arguments):
+        resume(parse("train", Resume, arguments))
+        return
     preset = chosen(arguments, "--preset", "draft")
     missing: Any = tyro.MISSING
     defaults = Train(
@@ -66,12 +86,49 @@ def run(arguments: Sequence[str]) -> None:
 
 
 def train(options: Train) -> Path:
-    """Train as asked and return the path of the model.
+    """Train as asked and return the path of the run folder.
 
     Raises:
-        VncaError: If an input cannot be used or the run folder cannot be written.
+        VncaError: If an input cannot be used, the run folder cannot be written, or training
+            diverges.
     """
-    run_folder = RunFolder(options.out, overwrite=options.overwrite)
+    return _train(options, RunFolder(options.out, overwrite=options.overwrite))
+
+
+def resume(options: Resume) -> Path:
+    """Go on with a training, if there is something left to do, and return the run folder.
+
+    Raises:
+        VncaError: If there is no checkpoint, an input changed, or as `train` says.
+    """
+    path = options.resume / CHECKPOINT_NAME
+    if not path.exists():
+        if not (options.resume / MODEL_NAME).exists():
+            raise FileFormatError(
+                f"{options.resume}: no training to go on with here (no {CHECKPOINT_NAME}); "
+                "begin one with vnca train FRAME STYLE --out"
+            )
+        say(f"{options.resume}: this training has come to its end; there is nothing left to do")
+        return options.resume
+    checkpoint = Checkpoint.load(path)
+    try:
+        asked = restored(Train, checkpoint.options)
+        iteration = int(checkpoint.training["trainer"].values["iteration"])
+    except (KeyError, TypeError, ValueError, VncaError) as error:
+        raise FileFormatError(
+            f"{path}: vnca {checkpoint.version} wrote this checkpoint with other options than "
+            f"this one has, or it is damaged ({error})"
+        ) from error
+    asked = dataclasses.replace(
+        asked,
+        out=options.resume,
+        frame=options.frame or asked.frame,
+        style=options.style or asked.style,
+    )
+    return _train(asked, RunFolder(asked.out, resumed_from=iteration), checkpoint)
+
+
+def _train(options: Train, run_folder: RunFolder, checkpoint: Checkpoint | None = None) -> Path:
     style = read_image(options.style)
     device = choose_device(options.device)
     smoke_format = beside(options.frame, options.smoke)
@@ -94,39 +151,97 @@ def train(options: Train) -> Path:
         "features_origin": vgg.origin,
         "features_dtype": str(vgg.dtype).removeprefix("torch."),
     }
+    inputs = fingerprints(smoke, style, options.config, vgg)
+    if checkpoint is not None:
+        checkpoint.resume(trainer, inputs, run_folder.path / CHECKPOINT_NAME)
+    asked = _asked(dataclasses.replace(options, smoke=smoke_format))
     with run_folder as folder:
+        session = _Session(trainer, options, folder, style, training, inputs, asked)
+        session.keep()
         folder.start(options.config, training)
         say(
             f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
             f"features '{vgg.name}', {device}"
         )
-        _improve(trainer, options, folder, style, training)
+        session.improve()
     return options.out
 
 
-def _improve(
-    trainer: Trainer, options: Train, folder: RunFolder, style: FloatArray, training: dict[str, Any]
-) -> None:
-    """Iterate to the end or to Ctrl-C; either way the folder holds a usable model."""
+def _asked(options: Train) -> dict[str, Any]:
+    """The options as JSON, with paths that hold from any folder."""
+    config = options.config
+    if Path(config.features).suffix:  # else a name
+        config = dataclasses.replace(config, features=str(Path(config.features).absolute()))
+    return recorded(
+        dataclasses.replace(
+            options,
+            frame=options.frame.absolute(),
+            style=options.style.absolute(),
+            out=options.out.absolute(),
+            config=config,
+        )
+    )
 
-    def keep() -> None:
-        provenance = {**training, "iterations": trainer.iteration}
-        folder.save(Model(trainer.rule(), provenance, _small(style)))
-        folder.preview(preview_sheet(trainer, style), trainer.iteration)
 
-    total = options.config.iterations
-    with Progress("training", total, "iterations") as progress:
+@dataclass(frozen=True)
+class _Session:
+    """A trainer, and what it leaves in the folder of its run."""
+
+    trainer: Trainer
+    options: Train
+    folder: RunFolder
+    style: FloatArray
+    training: dict[str, Any]
+    inputs: dict[str, str]
+    asked: dict[str, Any]
+
+    def improve(self) -> None:
+        """Iterate to the end or to Ctrl-C; either way the folder holds a usable model."""
+        trainer, folder, total = self.trainer, self.folder, self.options.config.iterations
+        progress = Progress("training", total, "iterations", already=trainer.iteration)
         try:
-            for step in trainer.run():
-                folder.log(step, trainer.learning_rate)
-                progress.show(step.iteration, f"loss {step.loss:.2f}")
-                if step.iteration % options.preview_every == 0 or step.iteration == total:
-                    keep()
+            with progress:
+                for step in trainer.run():
+                    folder.log(step, trainer.learning_rate)
+                    progress.show(step.iteration, f"loss {step.loss:.2f}")
+                    if step.diverged:
+                        say(self._setback())
+                    if step.iteration % self.options.preview_every == 0 and step.iteration < total:
+                        self.show()
+                    if folder.is_keeping_due:
+                        self.keep()
         except KeyboardInterrupt:
-            keep()
-            say(f"\nstopped at iteration {trainer.iteration}; the model so far is in {folder.path}")
+            trainer.undo()
+            self.keep()
+            self.show()
+            say(
+                f"stopped at iteration {trainer.iteration}; the model so far is in {folder.path}; "
+                f"to go on: vnca train --resume {folder.path}"
+            )
             raise
-    say(f"model: {folder.path}")
+        except DivergenceError:
+            self.show()
+            raise
+        self.show()
+        folder.finish()
+        say(f"model: {folder.path}")
+
+    def keep(self) -> None:
+        """Write a checkpoint."""
+        self.folder.keep(Checkpoint(self.trainer.snapshot(), self.inputs, self.asked))
+
+    def show(self) -> None:
+        """Write the model and a preview."""
+        provenance = {**self.training, "iterations": self.trainer.iteration}
+        self.folder.save(Model(self.trainer.rule(), provenance, _small(self.style)))
+        self.folder.preview(preview_sheet(self.trainer, self.style), self.trainer.iteration)
+
+    def _setback(self) -> str:
+        trainer = self.trainer
+        return (
+            f"training diverged at iteration {trainer.iteration}: back to the weights of iteration "
+            f"{trainer.good_iteration}, at half the learning rate"
+        )
 
 
 def _small(style: FloatArray) -> Any:

@@ -110,7 +110,7 @@ class Descent:
             {name: matched(snapshot.tensors[when + name], own, name) for name, own in like.items()}
             for when in ("now.", "kept.")
         )
-        for name, tensor in (now | kept).items():
+        for name, tensor in (*now.items(), *kept.items()):
             if name.endswith(("step", "exp_avg_sq")) and bool((tensor < 0).any()):
                 raise ValueError(f"{name}: negative")
         values = snapshot.values

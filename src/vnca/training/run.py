@@ -12,29 +12,46 @@ import torch
 import vnca
 from vnca.automaton.model import MODEL_NAME, Model
 from vnca.errors import OutputError
-from vnca.files import whole_file, writable_folder
-from vnca.io.image import to_srgb8, write_image
+from vnca.files import remove_file, remove_leftovers, whole_file, writable_folder
+from vnca.io.image import write_image
+from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, Thrift
 from vnca.training.config import TrainConfig
+from vnca.training.curves import PATTERN, Curves
 from vnca.training.loop import Progress
 from vnca.typing import FloatArray
 
 CONFIG_NAME = "config.json"
-_OF_ONE_RUN = ("events.out.tfevents.*", "preview_[0-9]*.png")
+_PREVIEW = "preview_{:06d}.png"
+_OF_ONE_RUN = (PATTERN, "preview_[0-9]*.png")
 
 
 class RunFolder:
     """A run folder, written to while it is a context."""
 
-    def __init__(self, path: Path, *, overwrite: bool = False) -> None:
+    def __init__(
+        self, path: Path, *, overwrite: bool = False, resumed_from: int | None = None
+    ) -> None:
         """Choose a folder; nothing is written until the context begins.
 
+        Args:
+            path: The folder.
+            overwrite: Replace a run that the folder holds already.
+            resumed_from: Go on with the run that the folder holds, from this iteration.
+
         Raises:
-            OutputError: If it cannot be written, or holds a model already and may not be
-                overwritten.
+            OutputError: If it cannot be written, or holds a run already and neither is asked for.
         """
         self.path = writable_folder(path)
-        self._overwrite = overwrite
-        if (self.path / MODEL_NAME).exists() and not overwrite:
+        self._overwrite, self._resumed_from = overwrite, resumed_from
+        self._thrift = Thrift()
+        if overwrite or resumed_from is not None:
+            return
+        if (self.path / CHECKPOINT_NAME).exists():
+            raise OutputError(
+                f"{self.path}: holds a training that was interrupted; go on with --resume "
+                f"{self.path}, or choose another --out or --overwrite"
+            )
+        if (self.path / MODEL_NAME).exists():
             raise OutputError(
                 f"{self.path}: holds a trained model already; choose another --out or --overwrite"
             )
@@ -45,16 +62,14 @@ class RunFolder:
         Raises:
             OutputError: If it cannot be written.
         """
-        from torch.utils.tensorboard.writer import SummaryWriter
-
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            if self._overwrite:
-                for old in chain.from_iterable(map(self.path.glob, _OF_ONE_RUN)):
-                    old.unlink()
-            self._events = SummaryWriter(str(self.path))
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
+        if self._overwrite:
+            for old in chain.from_iterable(map(self.path.glob, _OF_ONE_RUN)):
+                remove_file(old)
+        self._curves = Curves(self.path, after=self._resumed_from or 0)
         return self
 
     def __exit__(
@@ -63,11 +78,13 @@ class RunFolder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Flush the loss curves."""
-        self._events.close()
+        """End the loss curves."""
+        self._curves.close()
 
     def start(self, config: TrainConfig, training: dict[str, Any]) -> None:
         """Write what was asked for: resolved configuration, inputs, version and device."""
+        previews = map(_PREVIEW.format, range(config.iterations + 1))
+        remove_leftovers(self.path, {CONFIG_NAME, CHECKPOINT_NAME, MODEL_NAME, *previews})
         resolved = {
             "vnca": vnca.__version__,
             "torch": torch.__version__,
@@ -79,18 +96,20 @@ class RunFolder:
 
     def log(self, progress: Progress, learning_rate: float) -> None:
         """Add a point to the loss curves."""
-        at = progress.iteration
-        self._events.add_scalar("loss/total", progress.loss, at)
-        for name, value in progress.terms.items():
-            self._events.add_scalar(f"loss/{name}", value, at)
-        self._events.add_scalar("state/exploded", float(progress.exploded), at)
-        self._events.add_scalar("learning_rate", learning_rate, at)
+        values = {f"loss/{name}": value for name, value in progress.terms.items()}
+        values |= {
+            "loss/total": progress.loss,
+            "state/exploded": float(progress.exploded),
+            "learning_rate": learning_rate,
+        }
+        self._curves.add(progress.iteration, values)
 
     def preview(self, picture: FloatArray, iteration: int) -> Path:
         """Write a preview picture, linear RGB `[r, c, 3]`, and show it in TensorBoard."""
-        path = self.path / f"preview_{iteration:06d}.png"
+        path = self.path / _PREVIEW.format(iteration)
         write_image(path, picture)
-        self._events.add_image("preview", to_srgb8(picture), iteration, dataformats="HWC")
+        rows, columns, _ = picture.shape
+        self._curves.show(iteration, "preview", path.read_bytes(), rows, columns)
         return path
 
     def save(self, model: Model) -> Path:
@@ -98,3 +117,17 @@ class RunFolder:
         path = self.path / MODEL_NAME
         model.save(path)
         return path
+
+    def keep(self, checkpoint: Checkpoint) -> None:
+        """Write what it takes to go on, whole or not at all."""
+        with self._thrift.writing():
+            checkpoint.save(self.path / CHECKPOINT_NAME)
+
+    @property
+    def is_keeping_due(self) -> bool:
+        """Whether it is time for another checkpoint."""
+        return self._thrift.is_due
+
+    def finish(self) -> None:
+        """Remove the checkpoint: the training has come to its end."""
+        remove_file(self.path / CHECKPOINT_NAME)

@@ -1,0 +1,191 @@
+"""The checkpoint of a run: all it takes to go on, as safetensors with JSON metadata.
+
+Data only, never code; named tensors of every part of the training, one after the other.
+"""
+
+import dataclasses
+import hashlib
+import json
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+import vnca
+from vnca.errors import FileFormatError, OptionError, OutputError
+from vnca.features.vgg import VGG16
+from vnca.files import existing_file, whole_file
+from vnca.training.config import TrainConfig
+from vnca.training.loop import Trainer
+from vnca.training.snapshot import Snapshot
+from vnca.typing import AnyArray, FloatArray
+from vnca.volume import Volume
+
+CHECKPOINT_NAME = "checkpoint.safetensors"
+"""Name of the checkpoint in a run folder."""
+FORMAT_VERSION = 1
+
+_METADATA = "vnca_checkpoint"
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A training that was left, and what it was about.
+
+    Attributes:
+        training: What `Trainer.snapshot` gave.
+        inputs: What `fingerprints` gave.
+        options: What was asked for, to ask for it again; JSON values.
+        version: The `vnca` that wrote the file.
+    """
+
+    training: Mapping[str, Snapshot]
+    inputs: Mapping[str, str]
+    options: Mapping[str, Any]
+    version: str = vnca.__version__
+
+    def save(self, path: Path) -> None:
+        """Write the checkpoint, whole or not at all.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        tensors = {
+            f"{part}.{name}": tensor.cpu().contiguous()
+            for part, snapshot in self.training.items()
+            for name, tensor in snapshot.tensors.items()
+        }
+        described = {
+            "format_version": FORMAT_VERSION,
+            "version": self.version,
+            "inputs": self.inputs,
+            "options": self.options,
+            "values": {part: snapshot.values for part, snapshot in self.training.items()},
+        }
+        with whole_file(path) as temporary:
+            try:
+                save_file(tensors, temporary, metadata={_METADATA: json.dumps(described)})
+            except SafetensorError as error:  # a full disk, for one
+                raise OutputError(f"{path}: cannot be written ({error})") from error
+
+    @classmethod
+    def load(cls, path: Path) -> "Checkpoint":
+        """Read a checkpoint. Whether it fits its inputs is for `resume` to say.
+
+        Raises:
+            FileFormatError: If it is missing, not a checkpoint, damaged, or of a newer format.
+        """
+        existing_file(path)
+        try:
+            with safe_open(path, framework="pt") as file:
+                described = json.loads((file.metadata() or {})[_METADATA])
+                # Copies: what is read is not to change or vanish with the file.
+                tensors = {n: file.get_tensor(n).clone() for n in file.keys()}  # noqa: SIM118
+            version = described["format_version"]
+            if version > FORMAT_VERSION:
+                raise FileFormatError(
+                    f"{path}: checkpoint format {version} is newer than this vnca reads "
+                    f"({FORMAT_VERSION}); upgrade vnca"
+                )
+            return cls(
+                training={
+                    part: Snapshot(_of_part(tensors, part), dict(values))
+                    for part, values in described["values"].items()
+                },
+                inputs=dict(described["inputs"]),
+                options=dict(described["options"]),
+                version=str(described["version"]),
+            )
+        except (
+            *(SafetensorError, OSError, RecursionError),
+            *(AttributeError, KeyError, RuntimeError, TypeError, ValueError),
+        ) as error:
+            raise FileFormatError(f"{path}: not a vnca checkpoint, or damaged ({error})") from error
+
+    def resume(self, trainer: Trainer, inputs: Mapping[str, str], path: Path) -> None:
+        """Take a new trainer to where this one was left.
+
+        Args:
+            trainer: Made of inputs that are as they were.
+            inputs: Its `fingerprints`.
+            path: The file this was read from, to tell.
+
+        Raises:
+            OptionError: If an input is not what it was.
+            FileFormatError: If the checkpoint is damaged.
+        """
+        changed = [name for name, print_ in inputs.items() if self.inputs.get(name) != print_]
+        if changed:
+            raise OptionError(
+                f"{path}: the {' and the '.join(changed)} changed since this training began; put "
+                "back what was there, or train anew with --overwrite"
+            )
+        try:
+            trainer.restore(self.training)
+        except (KeyError, OverflowError, RuntimeError, TypeError, ValueError) as error:
+            raise FileFormatError(f"{path}: the checkpoint is damaged ({error})") from error
+
+
+def _of_part(tensors: Mapping[str, Tensor], part: str) -> dict[str, Tensor]:
+    start = f"{part}."
+    return {name[len(start) :]: t for name, t in tensors.items() if name.startswith(start)}
+
+
+def fingerprints(
+    smoke: Volume, style: FloatArray, config: TrainConfig, vgg: VGG16
+) -> dict[str, str]:
+    """What tells each input of a training from another, wherever its file lies."""
+    options = {k: v for k, v in dataclasses.asdict(config).items() if k != "features"}
+    frame = [smoke.density, smoke.origin]
+    if smoke.velocity is not None:
+        frame.append(smoke.velocity)
+    return {
+        "frame": _digest(*frame),
+        "style picture": _digest(style),
+        "options": hashlib.sha256(json.dumps(options).encode()).hexdigest(),
+        "weights of VGG16": vgg.origin,
+    }
+
+
+def _digest(*arrays: AnyArray | tuple[int, ...]) -> str:
+    digest = hashlib.sha256()
+    for array in map(np.ascontiguousarray, arrays):
+        digest.update(f"{array.dtype} {array.shape}".encode())
+        digest.update(array.data)
+    return digest.hexdigest()
+
+
+class Thrift:
+    """Says when a checkpoint is due, so that they take little of the time and of the disk.
+
+    It goes by the clock, which changes when checkpoints are written, not what is in them.
+    """
+
+    share = 0.01
+    """Part of the time that may be spent on writing them."""
+    least_seconds = 30.0
+    """Time between them even where they cost nothing."""
+
+    def __init__(self) -> None:
+        """Begin with one that is due."""
+        self._due = 0.0
+
+    @property
+    def is_due(self) -> bool:
+        """Whether it is time for another."""
+        return time.monotonic() >= self._due
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Measures what one costs while it is written; the next is due accordingly."""
+        start = time.monotonic()
+        yield
+        end = time.monotonic()
+        self._due = end + max(self.least_seconds, (end - start) / self.share)
