@@ -1,12 +1,28 @@
 """What can go wrong by a user's hand, one class a cause.
 
 The command line prints the message of a `VncaError` in one line and exits with code 2.
-A message names the file, grid or option, what was expected and what came.
+A message names the file, grid or option, what was expected and what came. Parts of it may come
+from a file: they can neither add lines nor write to the terminal what it would obey.
 """
+
+_LONGEST = 2000
+
+
+def printable(text: str) -> str:
+    """`text` as one line of moderate length, without characters that a terminal obeys."""
+    if len(text) > _LONGEST:
+        text = text[:_LONGEST] + "…"
+    line = " ".join(text.split("\n"))
+    if line.isprintable():
+        return line
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
 
 
 class VncaError(Exception):
     """A mistake the user can mend; the message says how."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 class FileFormatError(VncaError):

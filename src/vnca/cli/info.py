@@ -10,7 +10,7 @@ import tyro
 
 from vnca.automaton.model import MODEL_NAME, Model
 from vnca.cli.options import parse
-from vnca.errors import FileFormatError
+from vnca.errors import FileFormatError, printable
 from vnca.files import existing_file
 from vnca.io.vdb import GridHeader, open_vdb
 
@@ -25,7 +25,8 @@ class Info:
 
 def run(arguments: Sequence[str]) -> None:
     """Read the options and describe."""
-    print("\n".join(describe(parse("info", Info, arguments).path)))
+    for line in describe(parse("info", Info, arguments).path):
+        print(printable(line))
 
 
 def describe(path: Path) -> list[str]:
