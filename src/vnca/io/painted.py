@@ -12,7 +12,7 @@ from vnca.io.orientation import box_to_file, to_file, to_internal
 from vnca.io.smoke_format import CELLS_PER_FRAME, UNITS_METADATA, SmokeFormat, up_axis_of
 from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
-from vnca.io.vdb_smoke import density_header
+from vnca.io.vdb_smoke import read_density
 from vnca.typing import Box, FloatArray
 from vnca.volume import Volume
 
@@ -149,9 +149,7 @@ def _paint_vdb(
     path: Path, source: Path, format: SmokeFormat, frame: _Painting, colour_grids: Sequence[str]
 ) -> None:
     with open_vdb(source) as file:
-        header = density_header(file, format)
-        old = header.read()
-        cells = old.active_box()
+        header, old, cells = read_density(file, format)
         _, active = old.to_dense(cells)
         density, colour = frame.over(cells, source)
         dtype = VALUE_TYPES[old.value_type].dtype

@@ -1,5 +1,6 @@
 """Smoke in OpenVDB files: which grids it is, and whether they fit together."""
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -16,12 +17,14 @@ from vnca.io.smoke_format import (
     single_precision,
     upper_grown,
 )
-from vnca.io.vdb import VALUE_TYPES, GridHeader, Transform, VdbFile, open_vdb
+from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, VdbFile, open_vdb
 from vnca.typing import BoolArray, Box, FloatArray
 
 VELOCITY_NAMES = ("velocity", "vel", "v")
 _AXES = "xyz"
 _CELL_TOLERANCE = 1e-3
+# A small file may want arrays of 512³ cells, one of 500 KB the most there are (2³¹).
+MOST_CELLS, MOST_CELLS_A_BYTE = 2**27, 2**12
 
 
 def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
@@ -34,13 +37,7 @@ def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
         GridError: If grids are missing, of the wrong kind, or do not fit together.
     """
     with open_vdb(path) as file:
-        header = density_header(file, format)
-        density = header.read()
-        box = density.active_box()
-        if header.box is not None and header.box.union(box) != header.box:
-            raise FileFormatError(
-                f"{path}: grid {header.name!r} has active cells outside the box its metadata gives"
-            )
+        header, density, box = read_density(file, format)
         values, active = density.to_dense(box, fill=0)
         del density, active
         return StoredSmoke(
@@ -82,6 +79,27 @@ def density_header(file: VdbFile, format: SmokeFormat) -> GridHeader:
     if header.grid_class == "level set":
         raise GridError(f"{label} is a level set, expected a fog volume; convert it first")
     return header
+
+
+def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, Box]:
+    """The density grid, and the smallest box around its active cells.
+
+    Raises:
+        FileFormatError: If it is truncated or corrupt.
+        GridError: If it is missing, of the wrong kind, or too sparse to be put into an array.
+    """
+    header = density_header(file, format)
+    label = f"{file.path}: grid {header.name!r}"
+    grid = header.read()
+    box = grid.active_box()
+    if header.box is not None and header.box.union(box) != header.box:
+        raise FileFormatError(f"{label} has active cells outside the box its metadata gives")
+    if math.prod(box.shape) > max(MOST_CELLS, header.stored_bytes * MOST_CELLS_A_BYTE):
+        raise GridError(
+            f"{label}: {grid.active_voxels} active cells are scattered over {_extent(box)}, too "
+            "many to hold; remove those that stray, or resample the grid"
+        )
+    return header, grid, box
 
 
 def _read_velocity(

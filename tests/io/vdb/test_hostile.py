@@ -2,6 +2,7 @@
 
 import random
 import struct
+import time
 import tracemalloc
 import zlib
 from collections.abc import Callable
@@ -145,6 +146,67 @@ def test_a_bomb_is_not_unpacked(tmp_path: Path, random_grid: Builder, scratch: P
     assert not survives(scratch, bytes(data))
     assert tracemalloc.get_traced_memory()[1] < 5_000_000
     tracemalloc.stop()
+
+
+def file_of(*grids: tuple[bytes, bytes, bytes]) -> bytes:
+    """A file of grids of these names, types and contents; nothing in them is checked here."""
+    data = bytearray(struct.pack("<q3I?36sII", 0x56444220, 224, 10, 0, True, b"", 0, len(grids)))
+    for name, type_name, content in grids:
+        data += b"".join(struct.pack("<I", len(s)) + s for s in (name, type_name, b""))
+        start = len(data) + 24
+        end = start + len(content)
+        data += struct.pack("<3q", start, end, end) + content
+    return bytes(data)
+
+
+def head(*numbers: float, map_type: bytes = b"ScaleMap") -> bytes:
+    """Compression, metadata and transform of a grid."""
+    transform = struct.pack(f"<{len(numbers)}d", *numbers)
+    return struct.pack("<3I", 2, 0, len(map_type)) + map_type + transform
+
+
+UNIT = head(*[1.0] * 15)
+
+
+def test_many_grids_of_one_name_open_at_once(scratch: Path) -> None:
+    """Finding a free name for each by counting up took a time that grew as their square."""
+    data = file_of(*[(b"a", b"Tree_float_5_4_3", UNIT)] * 8_000)
+    begin = time.process_time()
+    scratch.write_bytes(data)
+    with open_vdb(scratch) as file:
+        assert file.names[7_999] == "a[7999]"
+    assert time.process_time() - begin < 5
+
+
+def test_a_long_type_name_is_read_at_once(scratch: Path) -> None:
+    """Searched with a regular expression it took minutes."""
+    scratch.write_bytes(file_of((b"a", b"Tree" + b"_1" * 100_000 + b"!", UNIT)))
+    begin = time.process_time()
+    with open_vdb(scratch) as file, pytest.raises(FileFormatError, match="cannot read values"):
+        file.read("a")
+    assert time.process_time() - begin < 5
+
+
+def test_tiles_upon_each_other_are_refused(scratch: Path) -> None:
+    """Each would fill the same cells of an array again."""
+    tile = struct.pack("<3if?", 0, 0, 0, 1, True)
+    tree = struct.pack("<ifII", 1, 0, 2, 0) + 2 * tile
+    assert not survives(scratch, file_of((b"a", b"Tree_float_5_4_3", UNIT + tree)))
+    tree = struct.pack("<ifII", 1, 0, 1, 0) + tile
+    assert survives(scratch, file_of((b"a", b"Tree_float_5_4_3", UNIT + tree)))
+
+
+@pytest.mark.parametrize("size", [0, 1e-40, 1e40, float("nan"), float("inf")])
+def test_transforms_that_leave_the_range_of_numbers_are_refused(size: float, scratch: Path) -> None:
+    assert not survives(scratch, file_of((b"a", b"Tree_float_5_4_3", head(*[size] * 15))))
+
+
+def test_a_message_neither_grows_with_a_file_nor_drives_the_terminal(scratch: Path) -> None:
+    scratch.write_bytes(file_of((b"a", b"\x1b[31m\n" + b"x" * 100_000, UNIT)))
+    with open_vdb(scratch) as file, pytest.raises(FileFormatError) as caught:
+        file.read("a")
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 3000
 
 
 @pytest.mark.parametrize("content", [b"", b"v", b" BDV", b"%PNG" * 50])

@@ -66,7 +66,7 @@ class Codec:
         omits = Compression.ACTIVE_MASK in self.flags
         stored = active.copy() if omits else np.ones_like(active)
         counts = stored.sum(axis=1).tolist()
-        masks = np.packbits(active, axis=1, bitorder="little")
+        masks = np.packbits(active, axis=1, bitorder="little") if is_leaf else active
         if omits:
             values[...] = self.background
         chunks = []

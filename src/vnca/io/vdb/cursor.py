@@ -1,6 +1,7 @@
 """Reading forwards through a range of a file, never past its end."""
 
 import struct
+from functools import cache
 from typing import Any, BinaryIO
 
 from vnca.errors import FileFormatError
@@ -41,7 +42,7 @@ class Cursor:
         Raises:
             FileFormatError: If not.
         """
-        if not 0 <= count <= self.remaining:
+        if not 0 <= count <= self.end - self.position:
             raise self.error(
                 f"truncated or corrupt: needs {count} bytes more, {self.remaining} are left"
             )
@@ -74,12 +75,18 @@ class Cursor:
 
     def unpack(self, layout: str) -> Any:
         """The next little-endian value of `layout` (as `struct`), or a tuple of several."""
-        values = struct.unpack(f"<{layout}", self.take(struct.calcsize(f"<{layout}")))
+        form = _form(layout)
+        values = form.unpack(self.take(form.size))
         return values[0] if len(values) == 1 else values
 
     def string(self) -> bytes:
         """The next string. Reference: `util/Name.h`, `readString`."""
         return self.take(self.unpack("I"))
+
+
+@cache
+def _form(layout: str) -> struct.Struct:
+    return struct.Struct(f"<{layout}")
 
 
 def encode_string(text: bytes) -> bytes:

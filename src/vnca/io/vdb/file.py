@@ -117,8 +117,9 @@ def _read_file_header(cursor: Cursor, path: Path, stream: BinaryIO) -> Source:
 
 def _read_headers(cursor: Cursor, source: Source) -> dict[str, GridHeader]:
     headers: dict[str, GridHeader] = {}
+    numbers: dict[str, int] = {}
     parents: dict[bytes, GridHeader] = {}
     for _ in range(cursor.unpack("I")):
-        unique_name, header = read_header(cursor, source, headers, parents)
+        unique_name, header = read_header(cursor, source, headers, numbers, parents)
         headers[header.name] = parents[unique_name] = header
     return headers

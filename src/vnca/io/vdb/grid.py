@@ -128,23 +128,27 @@ class Grid:
 
     def _scatter_leaves(self, values: AnyArray, active: BoolArray, lower: AnyArray) -> None:
         """Write leaves into arrays whose first cell, `lower`, is aligned to leaves."""
-        bricks = (self.tree.leaf_origins - lower) // LEAF_EDGE
-        counts = np.array(active.shape) // LEAF_EDGE
-        inside = ((bricks >= 0) & (bricks < counts)).all(axis=1)
-        chosen = slice(None) if inside.all() else inside
-        i, j, k = bricks[chosen].T
-        for dense, leaves in ((values, self.tree.leaf_values), (active, self.tree.leaf_active)):
-            cells = leaves[chosen]
-            as_bricks(dense)[i, j, k] = cells.reshape(
-                len(cells), LEAF_EDGE, LEAF_EDGE, LEAF_EDGE, *cells.shape[2:]
-            )
+        tree, edges = self.tree, (LEAF_EDGE,) * 3
+        cells = tree.leaf_values.reshape(-1, *edges, *tree.leaf_values.shape[2:])
+        _put_bricks(
+            values, active, tree.leaf_origins - lower, cells, tree.leaf_active.reshape(-1, *edges)
+        )
 
     def _scatter_tiles(self, values: AnyArray, active: BoolArray, lower: AnyArray) -> None:
         tiles = self.tree.tiles
+        # There can be very many as wide as a leaf, but only few larger ones in an array.
+        small, everywhere = tiles.edges == LEAF_EDGE, np.s_[:, None, None, None]
+        _put_bricks(
+            values,
+            active,
+            tiles.origins[small] - lower,
+            tiles.values[small][everywhere],
+            tiles.active[small][everywhere],
+        )
         starts = tiles.origins - lower
         stops = np.minimum(starts + tiles.edges[:, None].astype(np.int64), active.shape)
         starts = np.maximum(starts, 0)
-        for tile in np.flatnonzero((starts < stops).all(axis=1)):
+        for tile in np.flatnonzero((starts < stops).all(axis=1) & ~small):
             region = tuple(slice(*ends) for ends in zip(starts[tile], stops[tile], strict=True))
             values[region] = tiles.values[tile]
             active[region] = tiles.active[tile]
@@ -208,6 +212,18 @@ def as_bricks(dense: AnyArray) -> AnyArray:
     x, y, z = (cells // LEAF_EDGE for cells in dense.shape[:3])
     split = dense.reshape(x, LEAF_EDGE, y, LEAF_EDGE, z, LEAF_EDGE, *dense.shape[3:])
     return split.transpose(0, 2, 4, 1, 3, 5, *range(6, split.ndim))
+
+
+def _put_bricks(
+    values: AnyArray, active: BoolArray, starts: AnyArray, cells: AnyArray, are_active: AnyArray
+) -> None:
+    """Write bricks of 8³ cells that begin at `starts` `[n, 3]` and lie inside the arrays."""
+    bricks = starts // LEAF_EDGE
+    inside = ((bricks >= 0) & (bricks < np.array(active.shape) // LEAF_EDGE)).all(axis=1)
+    chosen = slice(None) if inside.all() else inside
+    i, j, k = bricks[chosen].T
+    as_bricks(values)[i, j, k] = cells[chosen]
+    as_bricks(active)[i, j, k] = are_active[chosen]
 
 
 def _value_type_of(name: str, values: AnyArray, active: BoolArray) -> ValueType:

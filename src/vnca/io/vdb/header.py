@@ -3,7 +3,6 @@
 Reference: OpenVDB `io/GridDescriptor.cc`, `io/Archive.cc` (`readGrid`), `io/File.cc`.
 """
 
-import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +17,7 @@ from vnca.io.vdb.transform import Transform, read_transform
 from vnca.io.vdb.tree import read_tree
 from vnca.typing import Box
 
-_TREE_TYPE = re.compile(r"Tree_(\w+?)((?:_\d+)+)")
+_TREE_NAME = "Tree_{}_" + "_".join(map(str, TREE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +88,20 @@ class GridHeader:
     @property
     def value_type(self) -> str:
         """`float`, `vec3s`, …; the tree's whole type where that is unusual."""
-        match = _TREE_TYPE.fullmatch(self.type_name)
-        is_usual = match and match[2] == "".join(f"_{bits}" for bits in TREE)
-        return match[1] if match and is_usual else self.type_name
+        before, after = _TREE_NAME.split("{}")
+        name = self.type_name.removeprefix(before).removesuffix(after)
+        return name if name and _TREE_NAME.format(name) == self.type_name else self.type_name
 
     @property
     def grid_class(self) -> str:
         """`fog volume`, `level set`, `staggered` or `unknown`."""
         return self.metadata.value("class", "unknown")
+
+    @property
+    def stored_bytes(self) -> int:
+        """Bytes of the file that its tree takes."""
+        owner = self.parent or self
+        return owner.end - (owner.tree_start or owner.transform_start)
 
     @property
     def transform(self) -> Transform:
@@ -155,6 +160,7 @@ def read_header(
     cursor: Cursor,
     source: Source,
     taken: Collection[str],
+    numbers: dict[str, int],
     parents: Mapping[bytes, GridHeader],
 ) -> tuple[bytes, GridHeader]:
     """The descriptor at the cursor and what it points to; the cursor moves to the next one.
@@ -163,6 +169,7 @@ def read_header(
         cursor: Over the whole file.
         source: The file.
         taken: Names of the headers before this one.
+        numbers: How often a name was wanted that was taken; kept between calls.
         parents: The headers before this one by the name their descriptor gives.
 
     Returns:
@@ -172,7 +179,7 @@ def read_header(
         FileFormatError: If the descriptor or what it points to is truncated or corrupt.
     """
     unique_name, type_name, parent_name = cursor.string(), cursor.string(), cursor.string()
-    name = _unused_name(unique_name, taken)
+    name = _unused_name(unique_name, taken, numbers)
     start, blocks, end = cursor.unpack("3q")
     parent = None
     if parent_name:
@@ -217,12 +224,11 @@ def decoded(name: bytes) -> str:
     return name.decode("utf-8", "backslashreplace")
 
 
-def _unused_name(unique_name: bytes, taken: Collection[str]) -> str:
+def _unused_name(unique_name: bytes, taken: Collection[str], numbers: dict[str, int]) -> str:
     """Reference: `io/GridDescriptor.cc`, `nameAsString`."""
     base, separator, number = decoded(unique_name).partition(SUFFIX)
     name = first = f"{base}[{number}]" if separator else base
-    count = 0
     while name in taken:
-        count += 1
-        name = f"{first}[{count}]"
+        numbers[first] = numbers.get(first, 0) + 1
+        name = f"{first}[{numbers[first]}]"
     return name

@@ -62,7 +62,7 @@ class Entry:
                 return cls(name, bytes(value))
             parts = value if isinstance(value, (tuple, list)) else (value,)
             return cls(name, struct.pack(f"<{layout}", *parts))
-        except (struct.error, AttributeError, TypeError, OverflowError) as error:
+        except (struct.error, AttributeError, TypeError, ValueError, OverflowError) as error:
             raise OptionError(f"metadata: {value!r} cannot be stored as {name}") from error
 
 

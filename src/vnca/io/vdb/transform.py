@@ -24,6 +24,8 @@ _DOUBLES = {
     "UnitaryMap": 16,
 }
 LINEAR_MAPS = frozenset(_DOUBLES)
+# Numbers from here to its inverse can be inverted and squared in double precision.
+_LARGEST = 1e30
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ class Transform:
         """The simplest of OpenVDB's maps that says the same as a 4×4 column-convention matrix.
 
         Raises:
-            GridError: If the matrix is not affine and invertible.
+            GridError: If the matrix is not affine and invertible, or of absurd size.
         """
         matrix = np.asarray(index_to_world, np.float64)
         if matrix.shape != (4, 4) or not _is_usable(matrix):
@@ -96,11 +98,11 @@ class Transform:
 
 
 def _is_usable(matrix: AnyArray) -> bool:
-    return bool(
-        np.isfinite(matrix).all()
-        and np.array_equal(matrix[3], (0, 0, 0, 1))
-        and np.linalg.slogdet(matrix[:3, :3])[0] != 0
-    )
+    # Not-a-numbers are not smaller either.
+    if not (abs(matrix) <= _LARGEST).all() or not np.array_equal(matrix[3], (0, 0, 0, 1)):
+        return False
+    _, log_volume = np.linalg.slogdet(matrix[:3, :3])
+    return bool(log_volume >= -3 * np.log(_LARGEST))
 
 
 def read_transform(cursor: Cursor) -> tuple[str, Transform | None]:
@@ -109,12 +111,12 @@ def read_transform(cursor: Cursor) -> tuple[str, Transform | None]:
     The cursor moves past a linear map; it stays inside others, whose length is unknown here.
 
     Raises:
-        FileFormatError: If a linear map is truncated, not finite or not invertible.
+        FileFormatError: If a linear map is truncated, not invertible or of absurd size.
     """
     map_type = cursor.string().decode("utf-8", "backslashreplace")
     if map_type not in LINEAR_MAPS:
         return map_type, None
     transform = Transform(map_type, cursor.unpack(f"{_DOUBLES[map_type]}d"))
     if not _is_usable(transform.index_to_world):
-        raise cursor.error(f"corrupt: its {map_type} is not finite and invertible")
+        raise cursor.error(f"corrupt: its {map_type} is not invertible, or of absurd size")
     return map_type, transform
