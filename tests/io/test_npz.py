@@ -1,4 +1,6 @@
 import io
+import struct
+import tracemalloc
 import zipfile
 from pathlib import Path
 
@@ -127,6 +129,63 @@ def test_a_header_that_promises_other_data_allocates_nothing(
     with zipfile.ZipFile(tmp_path / "007.npz", "w") as archive:
         archive.writestr("x.npy", member.getvalue())
     with pytest.raises(FileFormatError, match=words):
+        read_npz_density(tmp_path / "007.npz")
+
+
+def archive(path: Path, member: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
+    with zipfile.ZipFile(path, "w", method) as file:
+        file.writestr("x.npy", member)
+
+
+@pytest.mark.parametrize(
+    "member",
+    [
+        b"\x93NUMPY\2\0" + b"\xff\xff\xff\x7f" + bytes(100_000_000),  # a header of 2 GB
+        b"\x93NUMPY\1\0" + b"\xe8\3" + b"-" * 1000,  # Python's parser runs out of memory
+        b"\x93NUMPY\1\0" + b"\x80\0" + b"(" * 128,  # or raises errors of its own
+        b"\x93NUMPY\1\0" + b"\x80\0" + b"{'sh\x84ape': (2, 2, 2), }".ljust(128),
+        b"\x93NUMPY\3\0" + b"\x80\0\0\0" + bytes(128),
+        b"no array",
+        b"",
+    ],
+    ids=range(7),
+)
+def test_a_header_that_is_none_is_one_clear_error(tmp_path: Path, member: bytes) -> None:
+    archive(tmp_path / "007.npz", member)
+    tracemalloc.start()
+    with pytest.raises(FileFormatError, match=r"007\.npz: not a readable npz file"):
+        read_npz_density(tmp_path / "007.npz")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 5e6
+
+
+def test_an_array_that_no_file_so_small_can_hold_is_refused(tmp_path: Path) -> None:
+    member = io.BytesIO()
+    npy.write_array_header_1_0(
+        member, {"descr": "<f4", "fortran_order": False, "shape": (1000, 1000, 1000)}
+    )
+    told = len(member.getvalue()) + 4 * 10**9
+    archive(tmp_path / "007.npz", member.getvalue() + bytes(100))
+    data = bytearray((tmp_path / "007.npz").read_bytes())
+    struct.pack_into("<I", data, data.index(b"PK\1\2") + 24, told % 2**32)
+    (tmp_path / "007.npz").write_bytes(data)
+    with pytest.raises(FileFormatError, match="cannot come from a file this small"):
+        read_npz_density(tmp_path / "007.npz")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
+def test_packings_that_numpy_does_not_use_are_refused(tmp_path: Path, method: int) -> None:
+    archive(tmp_path / "007.npz", b"x", method)
+    with pytest.raises(FileFormatError, match="packed otherwise"):
+        read_npz_density(tmp_path / "007.npz")
+
+
+def test_of_very_many_keys_a_few_are_listed(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "007.npz", "w") as file:
+        for number in range(100):
+            file.writestr(f"{number}.npy", b"")
+    with pytest.raises(FileFormatError, match="the file holds 0, 1, 2, 3, 4, 5, 6, 7 and 92 more"):
         read_npz_density(tmp_path / "007.npz")
 
 

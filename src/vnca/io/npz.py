@@ -7,10 +7,12 @@ lower faces of their cells; up is +y. There is no voxel size: a cell is one unit
 Reference: Kim et al. 2019, "Transport-Based Neural Style Transfer for Smoke Simulations".
 """
 
+import math
 import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import IO
 
@@ -30,7 +32,11 @@ from vnca.io.smoke_format import (
 from vnca.typing import AnyArray, Box, FloatArray
 
 KEY = "x"
-MAX_VALUES = 2**31
+MOST_VALUES = 2**31
+_MOST_HEADER = 1024  # bytes; numpy writes 128
+_MOST_KEYS = 8  # that a message lists
+_MOST_DEFLATED = 1032  # bytes that one byte of a deflated stream can stand for
+_PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
@@ -117,29 +123,42 @@ def _stored_velocity(path: Path, domain: Box, box: Box, staggered: bool) -> Stor
 def _ours(path: Path, values: AnyArray) -> FloatArray:
     """From `[z, y, x, ...]` to `[x, y, z, ...]`."""
     values = values.transpose(2, 1, 0, *range(3, values.ndim))
-    return single_precision(np.ascontiguousarray(values), path, f"array {KEY!r}")
+    with np.errstate(over="ignore"):
+        turned = np.array(values, np.float32, order="C")
+    return single_precision(turned, path, f"array {KEY!r}")
 
 
 def _read_array(path: Path, layout: str, components: tuple[int | None, ...]) -> AnyArray:
     """The array of a file, after its header was found to be what is expected."""
     path = existing_file(path)
     with _npy_member(path) as (stream, size):
-        shape, _, dtype = _HEADERS[npy.read_magic(stream)](stream)
+        shape, dtype, start = _read_header(stream)
         last = shape[3] if len(shape) == 4 else None
         if len(shape) not in (3, 4) or last not in components or dtype.kind != "f":
             raise FileFormatError(
                 f"{path}: expected floats {layout} under {KEY!r}, found {dtype} {list(shape)}"
             )
-        count = int(np.prod(shape, dtype=object))
-        if min(shape) < 1 or count > MAX_VALUES:
+        count = math.prod(shape)
+        if min(shape) < 1 or count > MOST_VALUES:
             raise FileFormatError(f"{path}: an array of {count} values is empty or too large")
-        if stream.tell() + count * dtype.itemsize != size:
+        if start + count * dtype.itemsize != size:
             raise FileFormatError(
                 f"{path}: truncated or corrupt: the header promises "
-                f"{count * dtype.itemsize} bytes, there are {size - stream.tell()}"
+                f"{count * dtype.itemsize} bytes, there are {size - start}"
             )
         stream.seek(0)
         return npy.read_array(stream, allow_pickle=False)
+
+
+def _read_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype, int]:
+    """Shape and type of an array, and the byte where its values begin."""
+    # numpy reads as many bytes as the header says it has, so it gets to see only so many.
+    head = BytesIO(stream.read(_MOST_HEADER))
+    try:
+        shape, _, dtype = _HEADERS[npy.read_magic(head)](head)
+    except Exception:  # numpy has Python parse it, which raises what the text makes it trip over
+        raise ValueError("its array has no header that can be read") from None
+    return shape, dtype, head.tell()
 
 
 @contextmanager
@@ -148,16 +167,27 @@ def _npy_member(path: Path) -> Iterator[tuple[IO[bytes], int]]:
     name = f"{KEY}.npy"
     try:
         with zipfile.ZipFile(path) as archive:
-            if name not in archive.namelist():
-                keys = ", ".join(n.removesuffix(".npy") for n in archive.namelist()) or "nothing"
-                raise FileFormatError(f"{path}: no array {KEY!r}; the file holds {keys}")
-            with archive.open(name) as stream:
-                yield stream, archive.getinfo(name).file_size
+            names = archive.namelist()
+            if name not in names:
+                keys = ", ".join(n.removesuffix(".npy") for n in names[:_MOST_KEYS]) or "nothing"
+                more = f" and {len(names) - _MOST_KEYS} more" * (len(names) > _MOST_KEYS)
+                raise FileFormatError(f"{path}: no array {KEY!r}; the file holds {keys}{more}")
+            member = archive.getinfo(name)
+            if member.compress_type not in _PACKINGS:
+                raise FileFormatError(f"{path}: array {KEY!r} is packed otherwise than numpy does")
+            if member.file_size > path.stat().st_size * _MOST_DEFLATED:
+                raise FileFormatError(
+                    f"{path}: truncated or corrupt: array {KEY!r} of {member.file_size} bytes "
+                    "cannot come from a file this small"
+                )
+            with archive.open(member) as stream:
+                yield stream, member.file_size
     except (
         OSError,
         EOFError,
         KeyError,
         ValueError,
+        OverflowError,
         RuntimeError,
         zipfile.BadZipFile,
         zlib.error,
