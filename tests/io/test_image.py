@@ -1,4 +1,6 @@
+import struct
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -122,6 +124,24 @@ def test_what_is_not_a_picture_is_refused_in_one_line(tmp_path, content, message
         read_image(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_chunk_that_claims_gigabytes_gets_none(tmp_path) -> None:
+    Image.new("RGB", (7, 5)).save(tmp_path / "a.png")
+    data = bytearray((tmp_path / "a.png").read_bytes())
+    struct.pack_into(">I", data, data.index(b"IDAT") - 4, 2**31 - 1)
+    (tmp_path / "a.png").write_bytes(data)
+    tracemalloc.start()
+    assert read_image(tmp_path / "a.png").shape == (5, 7, 3)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 5e6
+
+
+def test_formats_that_other_programs_decode_are_refused(tmp_path) -> None:
+    Image.new("RGB", (7, 5)).save(tmp_path / "a.eps")
+    with pytest.raises(FileFormatError, match="expected a picture"):
+        read_image(tmp_path / "a.eps")
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.webp"])

@@ -23,6 +23,8 @@ _ENCODERS: dict[str, tuple[str, dict[str, Any]]] = {
     ".jpeg": ("JPEG", {"quality": 92, "subsampling": 0}),
     ".webp": ("WEBP", {"quality": 92, "method": 4}),
 }
+# Pillow knows many more; some are decoded by other programs (EPS) or hardly tested.
+_READ = ("PNG", "JPEG", "WEBP", "TIFF", "GIF", "BMP", "PPM", "JPEG2000")
 SUFFIXES = (*_ENCODERS, ".exr")
 """What `write_image` writes."""
 _LARGEST_HALF = 65504.0
@@ -46,7 +48,9 @@ def read_image(path: Path) -> FloatArray:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             warnings.filterwarnings("ignore", category=UserWarning, module="PIL")
-            with Image.open(path) as image:
+            # From memory: Pillow asks a file for as many bytes as a chunk says it has, and Python
+            # makes room for them all before it reads.
+            with Image.open(BytesIO(path.read_bytes()), formats=_READ) as image:
                 return _linear_rgb(ImageOps.exif_transpose(image))
     except Image.UnidentifiedImageError as error:
         raise FileFormatError(
@@ -137,10 +141,14 @@ def _linear_rgb(image: Image.Image) -> FloatArray:
     if image.mode.startswith("I"):  # 16 bits of grey; Pillow widens some of them to 32.
         grey = srgb_to_linear(np.asarray(image).astype(np.float32) / 65535)
         return np.stack([grey] * 3, axis=-1)
-    rgba = _in_srgb(image).convert("RGBA")
-    pixels = np.asarray(rgba, np.float32) / 255
-    colour, alpha = srgb_to_linear(pixels[..., :3]), pixels[..., 3:]
-    return (colour * alpha + (1 - alpha)).astype(np.float32)
+    pixels = np.asarray(_in_srgb(image).convert("RGBA"))
+    # A table, because a large picture in floats several times over would fill the memory.
+    linear = srgb_to_linear(np.arange(256, dtype=np.float32) / 255).astype(np.float32)
+    colour = linear[pixels[..., :3]]
+    if (pixels[..., 3] == 255).all():
+        return colour
+    alpha = pixels[..., 3:].astype(np.float32) / 255
+    return colour * alpha + (1 - alpha)
 
 
 def _in_srgb(image: Image.Image) -> Image.Image:
