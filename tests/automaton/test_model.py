@@ -1,15 +1,21 @@
 import json
+import math
+import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
-from vnca.automaton.model import MODEL_NAME, Model
+from vnca.automaton.model import MODEL_NAME, Model, from_record
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import FileFormatError, ModelError, OptionError, ShapeError
+from vnca.io.smoke_format import SmokeFormat
+from vnca.typing import AnyArray
 
 
 @pytest.fixture
@@ -59,6 +65,16 @@ def rewritten(path: Path, **changes: Any) -> None:
         ({"scales": {"density": 0.0}}, r"damaged.*density"),
         ({"scales": {"gamma": float("nan")}}, r"damaged.*gamma"),
         ({"rule": {"channels": 5, "hidden": 8}}, "expected shape"),
+        ({"rule": {"channels": 5, "hidden": 7.0}}, r"damaged.*hidden: 7\.0"),
+        ({"rule": {"channels": 5, "hidden": 7, "position_prior": "no"}}, "damaged.*position_prior"),
+        ({"rule": {"channels": 5, "hidden": 7, "sobel_divisor": math.nan}}, "damaged.*sobel"),
+        ({"rule": {"channels": 5, "hidden": 7, "steps_per_frame": 10**9}}, "damaged.*4096"),
+        ({"scales": {"density": True}}, "damaged.*density"),
+        ({"scales": {"density": 10**400}}, "damaged.*density"),
+        ({"scales": []}, "damaged.*Scales"),
+        ({"format_version": True}, "damaged"),
+        ({"format_version": 0}, "damaged"),
+        ({"training": [1]}, "damaged"),
     ],
 )
 def test_a_model_that_cannot_be_used_is_one_clear_line(
@@ -71,6 +87,111 @@ def test_a_model_that_cannot_be_used_is_one_clear_line(
         Model.load(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_metadata_nested_too_deeply_is_refused(model: Model, tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    model.save(path)
+    save_file(load_file(path), path, metadata={"vnca": "[" * 100_000})
+    with pytest.raises(ModelError, match="damaged"):
+        Model.load(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "tensor", "words"),
+    [
+        ("bias", np.zeros(7, np.int32), "'bias': expected floats, got int32"),
+        ("bias", np.full(7, 1e300), "'bias': not all finite"),
+        ("bias", np.zeros((7, 1), np.float32), "'bias': expected shape"),
+        ("style", np.zeros((2, 2, 4), np.uint8), "thumbnail"),
+        ("style", np.zeros((2, 2, 3), np.float32), "thumbnail"),
+    ],
+)
+def test_tensors_of_other_kinds_are_refused(
+    model: Model, tmp_path: Path, name: str, tensor: AnyArray, words: str
+) -> None:
+    path = tmp_path / "model.safetensors"
+    model.save(path)
+    with safe_open(path, framework="numpy") as file:
+        metadata = file.metadata()
+    save_file({**load_file(path), name: tensor}, path, metadata=metadata)
+    with pytest.raises(ModelError, match=words):
+        Model.load(path)
+
+
+@pytest.mark.parametrize(("dtype", "size"), [("BF16", 2), ("F8_E4M3", 1)])
+def test_tensors_of_types_that_numpy_lacks_are_refused(
+    tmp_path: Path, dtype: str, size: int
+) -> None:
+    header = {"bias": {"dtype": dtype, "shape": [1], "data_offsets": [0, size]}}
+    text = json.dumps(header).encode()
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(struct.pack("<Q", len(text)) + text + bytes(size))
+    with pytest.raises(ModelError, match="not a vnca model"):
+        Model.load(path)
+
+
+plain = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
+scales = st.floats(1e-6, 1e6)
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.builds(
+        RuleConfig,
+        channels=st.integers(4, 16),
+        hidden=st.integers(1, 16),
+        update_probability=st.floats(0, 1, exclude_min=True),
+        steps_per_frame=st.integers(1, 4096),
+        reach=st.integers(0, 64),
+        sobel_divisor=scales,
+        position_prior=st.booleans(),
+    ),
+    st.builds(Scales, density=scales, velocity=scales, gamma=scales),
+    st.dictionaries(st.text(), st.recursive(plain, st.lists, max_leaves=5), max_size=4),
+    st.none() | st.tuples(st.integers(1, 5), st.integers(1, 5), st.just(3)),
+)
+def test_any_model_comes_back(
+    tmp_path_factory: pytest.TempPathFactory,
+    config: RuleConfig,
+    normalisers: Scales,
+    training: dict[str, Any],
+    style_shape: tuple[int, int, int] | None,
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.safetensors"
+    random = np.random.default_rng(0)
+    style = None if style_shape is None else random.integers(0, 256, style_shape, np.uint8)
+    model = Model(Rule.initial(config, normalisers, seed=0), training, style)
+    model.save(path)
+    back = Model.load(path)
+    assert (back.rule.config, back.rule.scales) == (config, normalisers)
+    assert (back.training, back.version) == (training, model.version)
+    for name in ("hidden", "bias", "output"):
+        assert getattr(back.rule, name).tobytes() == getattr(model.rule, name).tobytes()
+    np.testing.assert_array_equal(back.style, style)
+
+
+@pytest.mark.parametrize(
+    ("record", "fits"),
+    [
+        ({}, True),
+        ({"fps": 25, "up_axis": "y", "staggered": None, "velocity_scale": "fit"}, True),
+        ({"velocity_scale": 2.5, "velocity_grid": None}, True),
+        ({"fps": "25"}, False),
+        ({"fps": True}, False),
+        ({"up_axis": "w"}, False),
+        ({"velocity_scale": "fitted"}, False),
+        ({"velocity_grid": 3}, False),
+        ({"no_such_field": 3}, False),
+        ([], False),
+    ],
+)
+def test_records_of_other_types_are_refused(record: Any, fits: bool) -> None:
+    if fits:
+        assert from_record(SmokeFormat, record) == SmokeFormat(**record)
+    else:
+        with pytest.raises(TypeError):
+            from_record(SmokeFormat, record)
 
 
 def test_files_that_are_no_models_are_refused(tmp_path: Path, model: Model) -> None:

@@ -4,7 +4,7 @@ import dataclasses
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ import vnca
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import ModelError, OptionError, ShapeError
 from vnca.files import existing_file, whole_file
+from vnca.typing import FloatArray
 
 FORMAT_VERSION = 1
 MODEL_NAME = "model.safetensors"
@@ -22,6 +23,10 @@ MODEL_NAME = "model.safetensors"
 
 _METADATA = "vnca"
 _WEIGHTS = ("hidden", "bias", "output")
+_STYLE = "style"
+_EXACT = 2**53  # whole numbers up to here are floats
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +56,7 @@ class Model:
             for name in _WEIGHTS
         }
         if self.style is not None:
-            tensors["style"] = np.ascontiguousarray(self.style)
+            tensors[_STYLE] = np.ascontiguousarray(self.style)
         # One entry: safetensors keeps several in no order, and equal models are equal bytes.
         metadata = {
             _METADATA: json.dumps(
@@ -84,8 +89,10 @@ class Model:
         try:
             with safe_open(path, framework="numpy") as file:
                 metadata = file.metadata() or {}
-                tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        except (SafetensorError, OSError, ValueError, TypeError) as error:
+                known = [name for name in file.keys() if name in (*_WEIGHTS, _STYLE)]  # noqa: SIM118
+                tensors = {name: file.get_tensor(name) for name in known}
+        # Types that numpy lacks raise the last two.
+        except (SafetensorError, OSError, ValueError, TypeError, AttributeError) as error:
             raise ModelError(f"{path}: not a vnca model ({error})") from error
         if _METADATA not in metadata:
             raise ModelError(f"{path}: a safetensors file, but not a vnca model")
@@ -93,22 +100,56 @@ class Model:
             described = json.loads(metadata[_METADATA])
             _check_format(path, described["format_version"])
             rule = Rule(
-                **{name: tensors[name].astype(np.float32) for name in _WEIGHTS},
-                config=RuleConfig(**described["rule"]),
-                scales=Scales(**described["scales"]),
+                **{name: _single_precision(name, tensors[name]) for name in _WEIGHTS},
+                config=from_record(RuleConfig, described["rule"]),
+                scales=from_record(Scales, described["scales"]),
             )
             training, version = dict(described["training"]), str(described["version"])
-        except (KeyError, TypeError, ValueError, OptionError) as error:
+        except (KeyError, TypeError, ValueError, RecursionError, OptionError) as error:
             raise ModelError(f"{path}: damaged model metadata ({error})") from error
         except ShapeError as error:
             raise ModelError(f"{path}: {error}") from error
-        style = tensors.get("style")
-        if style is not None and (style.dtype != np.uint8 or style.ndim != 3):
+        style = tensors.get(_STYLE)
+        if style is not None and (style.dtype != np.uint8 or style.shape[2:] != (3,)):
             raise ModelError(f"{path}: the style thumbnail is not an 8-bit picture")
         return cls(rule, training, style, version)
 
 
-def _check_format(path: Path, version: int) -> None:
+def from_record(kind: type[T], record: Any) -> T:
+    """A dataclass with fields of plain types from what JSON gives for it.
+
+    Raises:
+        TypeError: If `record` is no object, or a field is unknown or of another type.
+    """
+    if not isinstance(record, dict):
+        raise TypeError(f"{kind.__name__}: expected an object, got {record!r}")
+    hints = get_type_hints(kind)
+    for name, value in record.items():
+        if name in hints and not _fits(value, hints[name]):
+            raise TypeError(f"{name}: {value!r} is of another type")
+    return kind(**record)
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    if get_origin(hint) is Literal:
+        return value in get_args(hint)
+    if alternatives := get_args(hint):
+        return any(_fits(value, alternative) for alternative in alternatives)
+    if hint is float and type(value) is int:
+        return abs(value) <= _EXACT
+    return type(value) is hint
+
+
+def _single_precision(name: str, weights: NDArray[Any]) -> FloatArray:
+    if weights.dtype.kind != "f":
+        raise ShapeError(f"weights '{name}': expected floats, got {weights.dtype}")
+    with np.errstate(over="ignore"):  # the rule refuses what is not finite
+        return weights.astype(np.float32)
+
+
+def _check_format(path: Path, version: Any) -> None:
+    if type(version) is not int or version < 1:
+        raise ValueError(f"format version {version!r}")
     if version > FORMAT_VERSION:
         raise ModelError(
             f"{path}: model format {version} is newer than this vnca reads ({FORMAT_VERSION}); "

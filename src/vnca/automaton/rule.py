@@ -54,11 +54,11 @@ class RuleConfig:
             raise OptionError(f"--hidden {self.hidden}: at least 1 is needed")
         if not 0 < self.update_probability <= 1:
             raise OptionError(f"--update-probability {self.update_probability}: must be in (0, 1]")
-        if self.steps_per_frame < 1:
-            raise OptionError(f"--steps-per-frame {self.steps_per_frame}: at least 1 is needed")
+        if not 1 <= self.steps_per_frame <= 4096:
+            raise OptionError(f"--steps-per-frame {self.steps_per_frame}: must be from 1 to 4096")
         if not 0 <= self.reach <= 64:
             raise OptionError(f"--reach {self.reach}: must be from 0 to 64 cells")
-        if self.sobel_divisor <= 0 or self.laplacian_divisor <= 0:
+        if not all(0 < d < math.inf for d in (self.sobel_divisor, self.laplacian_divisor)):
             raise OptionError("--sobel-divisor and --laplacian-divisor must be positive")
 
     @property
