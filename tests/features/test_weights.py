@@ -12,6 +12,8 @@ from types import SimpleNamespace
 import h5py
 import pytest
 import torch
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from vnca.errors import BackendUnavailableError, FileFormatError, OptionError
@@ -265,6 +267,39 @@ def test_infinite_weights_are_refused(tmp_path: Path, torchvision_state: dict[st
     torch.save(broken, tmp_path / "a.pth")
     with pytest.raises(FileFormatError, match=r"conv1_2\.bias.*not finite"):
         load_weights(str(tmp_path / "a.pth"))
+
+
+def test_an_hdf5_file_cannot_ask_for_memory_or_for_other_files(tmp_path: Path) -> None:
+    """A data set may declare any shape without holding it, and have its values elsewhere."""
+    path, name, secret = tmp_path / "a.h5", "block1/layers/conv2d/vars/0", tmp_path / "secret"
+    secret.write_bytes(bytes(4 * 27 * 64))
+
+    def refused(words: str) -> None:
+        with pytest.raises(FileFormatError, match=words):
+            load_weights(str(path))
+
+    with h5py.File(path, "w") as file:
+        file.create_dataset(name, (10**6, 10**6, 3, 64), "f4", chunks=(1, 1, 3, 64))
+    refused("expected floats")
+    with h5py.File(path, "w") as file:
+        file.create_dataset(name, (3, 3, 3, 64), "f4", external=[(str(secret), 0, 4 * 27 * 64)])
+    refused("another file")
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        file.create_dataset("x", (3, 3, 3, 64), "f4")
+    with h5py.File(path, "w") as file:
+        file[name] = h5py.ExternalLink(tmp_path / "b.h5", "x")
+    refused("another file")
+
+
+def test_a_mean_that_is_no_numbers_is_refused(pth: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.safetensors"
+    save_weights(load_weights(str(pth)), path)
+    with safe_open(path, framework="pt") as file:
+        header = file.metadata()
+    for mean in ('"abc"', "[" * 100_000, "[1, 2]"):
+        save_file(load_file(path), path, metadata={**header, "mean": mean})
+        with pytest.raises(FileFormatError, match="not readable as VGG16 weights"):
+            load_weights(str(path))
 
 
 def test_pickled_code_is_not_run(tmp_path: Path) -> None:

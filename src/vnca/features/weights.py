@@ -10,7 +10,6 @@ import hashlib
 import importlib
 import json
 import os
-import pickle
 import sys
 import tempfile
 import urllib.request
@@ -240,12 +239,12 @@ def _read_safetensors(path: Path) -> Weights:
             header = file.metadata() or {}
             if header.get("format") != _FORMAT:
                 raise FileFormatError(f"{path}: not a VGG16 written by vnca")
-            red, green, blue = json.loads(header["mean"])
+            red, green, blue = map(float, json.loads(header["mean"]))
             tensors = {key: file.get_tensor(key).float() for key in file.keys()}  # noqa: SIM118
             weights = Weights(
                 header["source"], header["origin_sha256"], (red, green, blue), tensors
             )
-    except (SafetensorError, OSError, KeyError, ValueError, TypeError) as error:
+    except (SafetensorError, OSError, KeyError, ValueError, TypeError, RecursionError) as error:
         raise FileFormatError(f"{path}: not readable as VGG16 weights ({error})") from error
     return _checked(weights, path)
 
@@ -253,7 +252,8 @@ def _read_safetensors(path: Path) -> Weights:
 def _read_torch(path: Path, name: str | None = None) -> Weights:
     """A state dict with torchvision's keys; also inside a whole VGG16.
 
-    The file of `imagenet` is recognised by its hash; other files are taken to be trained with
+    Torch's restricted unpickler builds tensors and nothing else: no code of the file is run. The
+    file of `imagenet` is recognised by its hash; other files are taken to be trained with
     torchvision's usual standardisation.
     """
     origin = _sha256(path)
@@ -268,12 +268,14 @@ def _read_torch(path: Path, name: str | None = None) -> Weights:
             for conv, index in _TORCHVISION.items()
             for kind in ("weight", "bias")
         }
-    except (OSError, RuntimeError, EOFError, pickle.UnpicklingError) as error:
-        raise FileFormatError(f"{path}: not readable as PyTorch weights") from error
     except (KeyError, TypeError, AttributeError) as error:
         raise FileFormatError(
             f"{path}: not a VGG16 state dict, {error} is missing or of the wrong kind"
         ) from error
+    except MemoryError:
+        raise
+    except Exception as error:  # torch raises whatever a damaged file makes it trip over
+        raise FileFormatError(f"{path}: not readable as PyTorch weights") from error
     tensors["conv1_1.weight"] = tensors["conv1_1.weight"] / torch.tensor(deviation)[:, None, None]
     return _checked(Weights(name or path.name, origin, mean, tensors), path)
 
@@ -285,18 +287,28 @@ def _read_hdf5(path: Path, name: str | None = None) -> Weights:
     tensors: dict[str, Tensor] = {}
     try:
         with h5py.File(path) as file:
-            for conv in CONVOLUTIONS:
+            for conv, (inputs, outputs) in CONVOLUTIONS.items():
                 block, index = conv.removeprefix("conv").split("_")
                 suffix = "" if index == "1" else f"_{int(index) - 1}"
                 group = f"block{block}/layers/conv2d{suffix}/vars"
-                kernel, bias = (torch.from_numpy(file[f"{group}/{i}"][()]).float() for i in (0, 1))  # pyright: ignore
+                kernel = _dataset(file, f"{group}/0", (3, 3, inputs, outputs))
                 tensors[f"{conv}.weight"] = kernel.permute(3, 2, 0, 1)
-                tensors[f"{conv}.bias"] = bias
+                tensors[f"{conv}.bias"] = _dataset(file, f"{group}/1", (outputs,))
     except (OSError, KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
         raise FileFormatError(f"{path}: not the HDF5 weights of a VGG16 ({error})") from error
     first = tensors["conv1_1.weight"]
     tensors["conv1_1.weight"] = first.flip(1) * 255
     return _checked(Weights(name or path.name, _sha256(path), _CAFFE_MEAN, tensors), path)
+
+
+def _dataset(file: Any, name: str, shape: tuple[int, ...]) -> Tensor:
+    """An array of an HDF5 file, which may declare any shape and refer to any other file."""
+    found = file[name]
+    if found.shape != shape or found.dtype.kind != "f":
+        raise ValueError(f"{name}: expected floats {shape}, found {found.dtype} {found.shape}")
+    if found.file != file or found.external or found.is_virtual:
+        raise ValueError(f"{name}: its values are in another file")
+    return torch.from_numpy(found[()]).float()
 
 
 def _checked(weights: Weights, path: Path) -> Weights:
