@@ -127,3 +127,8 @@ def _checked(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         return function(*args, **kwargs)
     except ValueError as error:
         raise ShapeError(f"update step: {error}") from None
+    except TypeError:
+        raise ShapeError(
+            "update step: expected arrays of float32 or int32 in this machine's byte order, those "
+            "to be written to writable, and at most 2³¹ threads"
+        ) from None

@@ -5,7 +5,9 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <initializer_list>
 #include <string>
 #include <vector>
@@ -54,6 +56,8 @@ auto* data_of(const Array& array, const char* name, const std::vector<std::int64
         contiguous = contiguous && (actual[axis] < 2 || array.stride(axis) == stride);
     if (!contiguous && array.size() > 0)
         throw nb::value_error((std::string(name) + ": expected a contiguous array in main memory").c_str());
+    if (reinterpret_cast<std::uintptr_t>(array.data()) % alignof(T) != 0)
+        throw nb::value_error((std::string(name) + ": expected aligned numbers").c_str());
     if constexpr (std::is_same_v<Array, Input>) return static_cast<const T*>(array.data());
     else return static_cast<T*>(array.data());
 }
@@ -144,9 +148,24 @@ struct Arrays {
     }
 };
 
-void check_apart(const float* output, std::int64_t size, const float* input) {
-    if (size > 0 && output < input + size && input < output + size)
-        throw nb::value_error("the output shares memory with the input");
+// A place in memory. What is written may share it with nothing else.
+struct Extent {
+    std::uintptr_t begin, end;
+
+    template <class Array>
+    Extent(const Array& array)
+        : begin(reinterpret_cast<std::uintptr_t>(array.data())), end(begin + array.nbytes()) {}
+};
+
+void check_apart(std::initializer_list<Extent> outputs, std::initializer_list<Extent> inputs) {
+    for (const Extent& output : outputs) {
+        const auto overlaps = [&](const Extent& other) {
+            return &other != &output && output.begin < other.end && other.begin < output.end;
+        };
+        if (std::any_of(inputs.begin(), inputs.end(), overlaps) ||
+            std::any_of(outputs.begin(), outputs.end(), overlaps))
+            throw nb::value_error("an output shares memory with another array");
+    }
 }
 
 const Kernel& kernel_named(const std::string& name) {
@@ -174,7 +193,7 @@ NB_MODULE(_native, m) {
         const Step& step = arrays.step;
         const Kernel& kernel = kernel_named(instructions);
         float* const to = data_of<float>(out, "out", {step.cells + 1, step.channels});
-        check_apart(to, std::int64_t(out.size()), step.state);
+        check_apart({out}, {state, rows, neighbours, priors, first, bias, second, stencil});
         bool valid;
         {
             nb::gil_scoped_release released;
@@ -199,8 +218,8 @@ NB_MODULE(_native, m) {
             data_of<float>(to_bias, "gradient of the hidden bias", {step.hidden}),
             data_of<float>(to_second, "gradient of the output weights", {step.channels, step.hidden}),
         };
-        check_apart(to.state, std::int64_t(to_state.size()), step.state);
-        check_apart(to.state, std::int64_t(to_state.size()), from);
+        check_apart({to_state, to_first, to_bias, to_second},
+                    {state, rows, neighbours, priors, first, bias, second, stencil, gradient});
         bool valid;
         {
             nb::gil_scoped_release released;

@@ -6,9 +6,12 @@
 
 #include <atomic>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <mutex>
+#include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace vnca {
@@ -26,8 +29,9 @@ public:
     }
 
     // Runs task(index, worker) for every index in [0, tasks), `worker` < threads telling who does
-    // it. Returns when all are done. Tasks must not throw. A second caller at the same time, and
-    // one who wants a single thread, does its tasks itself.
+    // it. Returns when all are done. If a task throws, those not begun are left out and one of the
+    // exceptions is thrown here. A second caller at the same time, and one who wants a single
+    // thread, does its tasks itself; where no more threads can be had, fewer do.
     void run(int tasks, int threads, const std::function<void(int, int)>& task) {
         const std::unique_lock turn(turn_, std::try_to_lock);
         if (threads > tasks) threads = tasks;
@@ -37,23 +41,35 @@ public:
         }
         while (int(workers_.size()) < threads - 1) {
             const int worker = int(workers_.size()) + 1;
-            workers_.emplace_back([this, worker, seen = round_.load()] { work(worker, seen); });
+            try {
+                workers_.emplace_back([this, worker, seen = round_.load()] { work(worker, seen); });
+            } catch (const std::system_error&) {
+                break;
+            }
         }
         task_ = &task;
         tasks_ = tasks;
         threads_ = threads;
+        error_ = nullptr;
         next_.store(0, std::memory_order_relaxed);
         busy_.store(int(workers_.size()), std::memory_order_relaxed);
         round_.fetch_add(1, std::memory_order_release);
         round_.notify_all();
         take_tasks(0);
         for (int busy; (busy = busy_.load(std::memory_order_acquire)) != 0;) busy_.wait(busy);
+        if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
     }
 
 private:
     void take_tasks(int worker) {
-        for (int index; (index = next_.fetch_add(1, std::memory_order_relaxed)) < tasks_;)
-            (*task_)(index, worker);
+        try {
+            for (int index; (index = next_.fetch_add(1, std::memory_order_relaxed)) < tasks_;)
+                (*task_)(index, worker);
+        } catch (...) {
+            next_.store(tasks_, std::memory_order_relaxed);
+            const std::lock_guard lock(error_guard_);
+            error_ = std::current_exception();
+        }
     }
 
     void work(int worker, std::uint32_t seen) {
@@ -72,6 +88,8 @@ private:
     int tasks_ = 0, threads_ = 0;
     std::atomic<std::uint32_t> round_ = 0;
     std::atomic<int> next_ = 0, busy_ = 0;
+    std::mutex error_guard_;
+    std::exception_ptr error_;
 };
 
 }  // namespace vnca

@@ -20,7 +20,8 @@ struct Gradients {
 };
 
 // Both return false, leaving their output undefined, if a neighbour of one of the rows lies
-// outside [0, cells]; they never read or write through such an index.
+// outside [0, cells]; they never read or write through such an index. They throw where there is
+// not enough memory.
 bool forward(const Kernel&, const Step&, Rows, float* out, int threads);
 bool backward(const Kernel&, const Step&, Rows, const float* gradient, Gradients, int threads);
 
