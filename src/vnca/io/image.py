@@ -148,7 +148,7 @@ def _linear_rgb(image: Image.Image) -> FloatArray:
     if (pixels[..., 3] == 255).all():
         return colour
     alpha = pixels[..., 3:].astype(np.float32) / 255
-    return colour * alpha + (1 - alpha)
+    return (colour * alpha + (1 - alpha)).astype(np.float32, copy=False)
 
 
 def _in_srgb(image: Image.Image) -> Image.Image:
