@@ -13,15 +13,17 @@ RANKS = {
     "volume": 1, "camera": 1, "colour": 1, "files": 1, "kernels": 1,
     "io": 2, "automaton": 2, "render": 2, "features": 2, "simulate": 2,
     "losses": 3, "stylize": 3,
-    "training": 4, "evaluation": 4, "texturing": 4,
-    "viewer": 5,
+    "training": 4, "texturing": 4,
+    "evaluation": 5, "viewer": 5,
     "cli": 6,
 }  # fmt: skip
 WITHOUT_TORCH = {
     "errors", "typing", "volume", "camera", "colour", "files", "io", "automaton",
     "simulate", "stylize",
 }  # fmt: skip
-KERNELS_WITH_TORCH = {"reference.py", "native_autograd.py", "triton.py"}
+KERNELS_WITH_TORCH = {
+    "reference.py", "native_autograd.py", "perceivers.py", "triton.py", "triton_mask.py",
+}  # fmt: skip
 SOURCES = sorted(p for p in ROOT.rglob("*.py") if p != ROOT / "__init__.py")
 
 
