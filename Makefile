@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo test test-slow test-faults check format lock bench clean
+.PHONY: setup demo test test-slow test-faults fuzz audit check format lock bench clean
 
 setup: $(READY)
 
@@ -30,6 +30,19 @@ test-slow: setup
 
 test-faults: setup
 	$(BIN)/pytest -m faults tests/faults
+
+# Coverage-guided; the seconds are shared by all targets. Findings are left in build/fuzz.
+FUZZ_SECONDS ?= 600
+FUZZED := vdb npz model image
+fuzz: setup
+	for reader in $(FUZZED); do \
+	  $(BIN)/python fuzz/fuzz_$$reader.py -verbosity=0 \
+	    -max_total_time=$$(($(FUZZ_SECONDS) / $(words $(FUZZED)))) || exit 1; \
+	done
+
+audit: setup
+	$(BIN)/bandit --quiet --configfile pyproject.toml --recursive src fuzz benchmarks
+	$(BIN)/pip-audit --strict --disable-pip --require-hashes --progress-spinner off -r requirements/dev.txt
 
 check: setup
 	$(BIN)/ruff format --check .
