@@ -1,0 +1,198 @@
+"""Training that was interrupted, and going on with it."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from PIL import Image
+from safetensors.torch import load_file, save_file
+
+from vnca.automaton.model import MODEL_NAME, Model
+from vnca.errors import Terminated
+from vnca.losses.appearance import Appearance, AppearanceLoss
+from vnca.training.checkpoint import CHECKPOINT_NAME
+from vnca.training.loop import Progress, Trainer
+
+Vnca = Callable[..., Any]
+Begin = Callable[..., Path]
+
+
+@pytest.fixture(autouse=True)
+def small_previews(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take most of the time, and nothing here is about how they look."""
+    monkeypatch.setattr("vnca.training.preview.SIZE", 32)
+
+
+@pytest.fixture
+def begin(
+    vnca: Vnca,
+    frame: Path,
+    style: Path,
+    tiny: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Begin:
+    """Trains for four iterations in a folder; with an interruption, after two of them."""
+    improve = Trainer.improve
+
+    def run(name: str, interruption: type[BaseException] | None = None) -> Path:
+        def interrupted(self: Trainer) -> Progress:
+            progress = improve(self) if self.iteration < 2 or interruption is None else None
+            if progress is None:
+                assert interruption is not None
+                raise interruption
+            return progress
+
+        folder = tmp_path / name
+        with monkeypatch.context() as patch:
+            patch.setattr(Trainer, "improve", interrupted)
+            options = [*tiny, "--iterations", 4, "--preview-every", 3]
+            outcome = vnca("train", frame, style, "--out", folder, *options)
+        codes = {None: 0, KeyboardInterrupt: 130, Terminated: 143}
+        assert outcome.code == codes[interruption], outcome.err
+        assert "Traceback" not in outcome.err
+        if interruption is not None:
+            assert f"to go on: vnca train --resume {folder}" in outcome.err
+        return folder
+
+    return run
+
+
+def contents(run: Path) -> dict[str, bytes]:
+    return {p.name: p.read_bytes() for p in run.iterdir() if not p.name.startswith("events.")}
+
+
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt, Terminated])
+def test_a_training_gone_on_with_ends_as_if_it_had_not_been_interrupted(
+    vnca: Vnca, begin: Begin, interruption: type[BaseException]
+) -> None:
+    whole, run = begin("whole"), begin("run", interruption)
+    assert Model.load(run).training["iterations"] == 2
+    assert (run / CHECKPOINT_NAME).exists()
+    assert vnca("train", "--resume", run).code == 0
+    # The preview of where it was interrupted stays.
+    assert contents(run) == contents(whole) | {
+        "preview_000002.png": (run / "preview_000002.png").read_bytes()
+    }
+    finished = vnca("train", f"--resume={run}")
+    assert finished.code == 0
+    assert "come to its end" in finished.err
+    assert (run / MODEL_NAME).read_bytes() == (whole / MODEL_NAME).read_bytes()
+
+
+def test_the_curves_go_on_where_the_checkpoint_was(vnca: Vnca, begin: Begin) -> None:
+    accumulating = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    whole, run = begin("whole"), begin("run", KeyboardInterrupt)
+    vnca("train", "--resume", run)
+    assert len(list(run.glob("events.*"))) == 2
+
+    def curve(folder: Path) -> list[tuple[int, float]]:
+        events = accumulating.EventAccumulator(str(folder)).Reload()
+        assert events.Images("preview")
+        return [(point.step, point.value) for point in events.Scalars("loss/total")]
+
+    assert curve(run) == curve(whole)
+
+
+def test_a_folder_can_be_moved_and_its_inputs_too(vnca: Vnca, begin: Begin, frame: Path) -> None:
+    whole, run = begin("whole"), begin("run", KeyboardInterrupt)
+    moved = frame.rename(frame.parent.parent / frame.name)
+    run = run.rename(run.parent / "elsewhere")
+    complaint = vnca("train", "--resume", run).complaint
+    assert "no such file" in complaint
+    assert frame.name in complaint
+    assert vnca("train", "--resume", run, "--frame", moved).code == 0
+    assert (run / MODEL_NAME).read_bytes() == (whole / MODEL_NAME).read_bytes()
+
+
+def test_changed_inputs_are_refused(vnca: Vnca, begin: Begin, smoke: Path, style: Path) -> None:
+    run = begin("run", KeyboardInterrupt)
+    before = contents(run)
+    complaint = vnca("train", "--resume", run, "--frame", smoke / "ball_0003.vdb").complaint
+    assert "the frame changed since this training began" in complaint
+    Image.new("RGB", (40, 50), "red").save(style)
+    complaint = vnca("train", "--resume", run).complaint
+    assert "the style picture changed" in complaint
+    assert contents(run) == before
+
+
+def test_a_folder_without_a_training_is_told(vnca: Vnca, tmp_path: Path) -> None:
+    for folder in (tmp_path, tmp_path / "nowhere"):
+        complaint = vnca("train", "--resume", folder).complaint
+        assert f"{folder}: no training to go on with" in complaint
+
+
+def test_an_interrupted_training_is_not_overwritten_by_mistake(
+    vnca: Vnca, begin: Begin, frame: Path, style: Path, tiny: list[str]
+) -> None:
+    run = begin("run", KeyboardInterrupt)
+    (run / MODEL_NAME).unlink()
+    again = ["train", frame, style, "--out", run, *tiny]
+    complaint = vnca(*again).complaint
+    assert f"--resume {run}" in complaint
+    assert "--overwrite" in complaint
+    assert vnca(*again, "--overwrite").code == 0
+    assert not (run / CHECKPOINT_NAME).exists()
+    assert len(list(run.glob("events.*"))) == 1
+
+
+def test_a_damaged_checkpoint_is_told(vnca: Vnca, begin: Begin, tmp_path: Path) -> None:
+    run = begin("run", KeyboardInterrupt)
+    path = run / CHECKPOINT_NAME
+    whole, tensors = path.read_bytes(), load_file(path)
+    length = int.from_bytes(whole[:8], "little")
+    described = json.loads(json.loads(whole[8 : 8 + length])["__metadata__"]["vnca_checkpoint"])
+
+    def complaint(**options: object) -> str:
+        changed = {**described, "options": {**described["options"], **options}}
+        save_file(tensors, path, {"vnca_checkpoint": json.dumps(changed)})
+        return vnca("train", "--resume", run).complaint
+
+    for options in (
+        {"preview_every": 0},
+        {"preview_every": "1"},
+        {"device": None},
+        {"frame": 3},
+        {"colour": "blue"},
+        {"smoke": []},
+        {"config": {**described["options"]["config"], "milestones": 0.5}},
+        {"config": {**described["options"]["config"], "backend": "abacus"}},
+    ):
+        assert CHECKPOINT_NAME in complaint(**options)
+    path.write_bytes(whole[: len(whole) // 2])
+    assert CHECKPOINT_NAME in vnca("train", "--resume", run).complaint
+    path.write_bytes(b"")
+    assert CHECKPOINT_NAME in vnca("train", "--resume", run).complaint
+    shutil.copy(run / MODEL_NAME, path)
+    assert "not a vnca checkpoint" in vnca("train", "--resume", run).complaint
+
+
+def test_training_that_keeps_diverging_ends_with_a_line_and_a_model(
+    vnca: Vnca,
+    frame: Path,
+    smoke: Path,
+    style: Path,
+    tiny: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    compare = AppearanceLoss.__call__
+
+    def poisoned(self: AppearanceLoss, picture: torch.Tensor, *rest: object) -> Appearance:
+        appearance = compare(self, picture, *rest)  # type: ignore[arg-type]
+        return Appearance(appearance.total * torch.nan, appearance.terms)
+
+    monkeypatch.setattr(AppearanceLoss, "__call__", poisoned)
+    run = tmp_path / "run"
+    outcome = vnca("train", frame, style, "--out", run, *tiny, "--iterations", 20)
+    assert outcome.code == 2
+    assert "Traceback" not in outcome.err
+    *_, complaint = outcome.err.splitlines()
+    assert complaint.startswith("vnca: training has diverged 4 times")
+    assert "--learning-rate" in complaint
+    assert outcome.err.count("at half the learning rate") == 4
+    assert vnca("stylize", run, smoke, "--out", tmp_path / "painted", "--warmup", 1).code == 0
