@@ -1,3 +1,5 @@
+import os
+import subprocess
 import sys
 from fractions import Fraction
 
@@ -68,6 +70,26 @@ def test_the_same_frames_make_the_same_file(tmp_path, suffix) -> None:
         write(tmp_path / f"{name}{suffix}", frames)
     a, b = ((tmp_path / f"{name}{suffix}").read_bytes() for name in ("a", "b"))
     assert a == b
+
+
+ENCODE = """
+import sys, numpy as np
+from pathlib import Path
+from vnca.io.video import FilmWriter
+rows, columns = np.mgrid[:384, :144]
+with FilmWriter(Path(sys.argv[1]), 24) as film:
+    for k in range(6):
+        waves = np.sin((rows * 0.3 + columns * 0.2 + k)[..., None] + np.arange(3))
+        film.add(0.3 + 0.2 * waves + 0.05 * np.random.default_rng(k).random((384, 144, 3)))
+"""
+
+
+def test_a_film_does_not_depend_on_what_was_in_memory_before(tmp_path) -> None:
+    films = [tmp_path / "a.mp4", tmp_path / "b.mp4", tmp_path / "c.mp4"]
+    for film, filling in zip(films, ("0", "85", "170"), strict=True):
+        filled = {**os.environ, "MALLOC_PERTURB_": filling}  # Of the C library of GNU.
+        subprocess.run([sys.executable, "-c", ENCODE, str(film)], env=filled, check=True)
+    assert len({film.read_bytes() for film in films}) == 1
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
