@@ -7,8 +7,8 @@ from vnca.automaton.domain import Domain
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.automaton.stepper import stepper
 from vnca.errors import BackendUnavailableError, OptionError
-from vnca.kernels.update import backend, native
-from vnca.kernels.update.backend import choose, torch_step
+from vnca.kernels.update import backend, native, triton
+from vnca.kernels.update.backend import array_step, choose, torch_step
 
 needs_native = pytest.mark.skipif(native.unavailable() is not None, reason="not built")
 
@@ -53,7 +53,7 @@ def test_a_machine_without_any_backend_is_told_both_reasons() -> None:
 
 
 def test_unknown_backends_and_devices_are_refused() -> None:
-    with pytest.raises(OptionError, match="auto, native or reference, got fast"):
+    with pytest.raises(OptionError, match="auto, native, triton, reference, got fast"):
         choose("fast")
     with pytest.raises(BackendUnavailableError, match="on the CPU, not on cuda"):
         choose("native", device="cuda")
@@ -73,3 +73,39 @@ def test_a_rule_steps_alike_on_both_backends_and_with_its_own_divisors() -> None
         for name in ("native", "reference")
     )
     np.testing.assert_allclose(native_state, reference_state, rtol=1e-4, atol=1e-4)
+
+
+@pytest.fixture
+def gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(triton, "unavailable", lambda device: None)
+    backend._say_once.cache_clear()
+
+
+@pytest.mark.usefixtures("gpu")
+def test_auto_takes_triton_on_a_gpu_and_says_so_once(capsys: pytest.CaptureFixture[str]) -> None:
+    assert [choose(device="cuda"), choose(device="cuda")] == ["triton", "triton"]
+    assert capsys.readouterr().err == "vnca: running the triton step on cuda\n"
+    assert torch_step(device="cuda") is torch_step("triton", device="cuda") is triton.update
+
+
+@pytest.mark.parametrize(
+    ("broken", "device", "reason"),
+    [
+        ({"_missing": "No module named 'triton'"}, "cuda", "package triton is not installed"),
+        ({"_missing": None, "_interpreted": False}, "cpu", "on NVIDIA GPUs, not on cpu"),
+        ({"_missing": None, "_interpreted": False}, "cuda", "torch finds no NVIDIA GPU"),
+    ],
+)
+def test_triton_asked_for_where_it_cannot_run_says_why(
+    broken: dict[str, object], device: str, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in broken.items():
+        monkeypatch.setattr(triton, name, value, raising=False)
+    monkeypatch.setattr(triton.torch.cuda, "is_available", lambda: False)
+    with pytest.raises(BackendUnavailableError, match=f"triton cannot run: .*{reason}"):
+        torch_step("triton", device=device)
+
+
+def test_arrays_are_not_sent_to_a_gpu_one_step_at_a_time() -> None:
+    with pytest.raises(BackendUnavailableError, match=r"triton cannot run: .* not on arrays"):
+        array_step("triton")

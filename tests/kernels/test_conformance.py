@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from torch import Tensor
 from vnca.automaton.domain import Border, Domain
 from vnca.errors import ShapeError
 from vnca.kernels.update import native, reference
+from vnca.kernels.update import triton as triton_backend
 from vnca.kernels.update.mask import changing_rows
 from vnca.kernels.update.native_autograd import update as native_update
 from vnca.kernels.update.reference import Weights
@@ -19,6 +21,15 @@ from vnca.typing import AnyArray, FloatArray, IntArray
 
 INSTRUCTIONS = native.instructions() if native.unavailable() is None else []
 needs_native = pytest.mark.skipif(not INSTRUCTIONS, reason="the native kernel was not built")
+
+# The Triton kernels run on the GPU if there is one, else in Triton's interpreter.
+GPU = torch.cuda.is_available()
+DEVICE = "cuda" if GPU else "cpu"
+needs_triton = pytest.mark.skipif(
+    triton_backend.unavailable(DEVICE) is not None, reason=str(triton_backend.unavailable(DEVICE))
+)
+needs_gpu = pytest.mark.skipif(not GPU, reason="not interpreted: bfloat16, tensor cores")
+triton_update = partial(triton_backend.update, precision="ieee")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,31 +95,36 @@ def problem(
 Update = Callable[..., Tensor]
 
 
-def run(update: Update, p: Problem, dtype: torch.dtype) -> dict[str, AnyArray]:
+def run(update: Update, p: Problem, dtype: torch.dtype, device: str = "cpu") -> dict[str, AnyArray]:
     """The new state and the gradients."""
 
     def tensor(array: AnyArray, *, trained: bool = False) -> Tensor:
-        return torch.tensor(array, dtype=dtype, requires_grad=trained)
+        return torch.tensor(array, dtype=dtype, device=device, requires_grad=trained)
 
     state = tensor(p.state, trained=True)
     weights = Weights(*(tensor(w, trained=True) for w in (p.hidden, p.bias, p.output)))
     result = update(
         state,
-        torch.tensor(p.rows),
-        torch.tensor(p.neighbours),
+        torch.tensor(p.rows, device=device),
+        torch.tensor(p.neighbours, device=device),
         tensor(p.priors),
         weights,
-        tensor(p.stencil),
+        torch.tensor(p.stencil, dtype=torch.promote_types(dtype, torch.float32), device=device),
     )
     gradients = torch.autograd.grad(result, (state, *weights), tensor(p.gradient))
     names = ("state", "to_state", "to_hidden", "to_bias", "to_output")
-    return dict(zip(names, (t.detach().numpy() for t in (result, *gradients)), strict=True))
+    arrays = (
+        t.detach().to(torch.promote_types(dtype, torch.float32)) for t in (result, *gradients)
+    )
+    return dict(zip(names, (t.numpy(force=True) for t in arrays), strict=True))
 
 
-def assert_conforms(got: dict[str, AnyArray], expected: dict[str, AnyArray]) -> None:
+def assert_conforms(
+    got: dict[str, AnyArray], expected: dict[str, AnyArray], *, atol: float = 3e-6
+) -> None:
     for name, exact in expected.items():
         scale = np.abs(exact).max(initial=1e-30)
-        np.testing.assert_allclose(got[name] / scale, exact / scale, atol=3e-6, err_msg=name)
+        np.testing.assert_allclose(got[name] / scale, exact / scale, atol=atol, err_msg=name)
 
 
 CASES = {
@@ -124,6 +140,7 @@ CASES = {
     "wraps onto itself": {"shape": (2, 1, 3), "border": "circular", "probability": 1},
     "wide": {"shape": (5, 6, 7), "channels": 64, "hidden": 512, "priors": 16},
     "many channels": {"channels": 20, "hidden": 100, "priors": 2},
+    "single brick": {"shape": (8, 8, 8), "hidden": 32},
 }  # fmt: skip
 
 
@@ -139,6 +156,97 @@ def test_a_step_and_all_its_gradients_agree_with_the_reference(case: str, backen
         state = p.forward(instructions=backend)
         gradients = zip(names, p.backward(instructions=backend), strict=True)
         assert_conforms({"state": state, **dict(gradients)}, exact)
+
+
+TRITON_CASES = {
+    "several portions of hidden units": {"shape": (3, 4, 3), "hidden": 300, "priors": 16},
+    "channels of two widths": {"shape": (3, 3, 5), "channels": 20, "hidden": 24, "priors": 2},
+    "flat": {"shape": (5, 1, 6), "occupancy": 0.7, "probability": 1},
+    "no row": {"shape": (2, 3, 2), "probability": 1e-9},
+}
+QUICK = ("one cell", "one row of cells", "no cell", "wraps", "wraps onto itself")
+"""Cases that take Triton's interpreter about a second, or less."""
+TRITON_CASES |= CASES if GPU else {name: CASES[name] for name in QUICK}
+
+
+@needs_triton
+@pytest.mark.parametrize("case", TRITON_CASES)
+def test_the_triton_step_and_all_its_gradients_agree_with_the_reference(case: str) -> None:
+    p = problem(**TRITON_CASES[case])
+    got = run(triton_update, p, torch.float32, DEVICE)
+    assert_conforms(got, run(reference.update, p, torch.float64))
+
+
+@needs_triton
+@pytest.mark.parametrize(
+    ("dtype", "atol", "cosine"),
+    [
+        (torch.float16, 2e-3, 0.999999),
+        pytest.param(torch.bfloat16, 0.03, 0.999, marks=needs_gpu),
+    ],
+)
+def test_the_triton_step_keeps_its_tolerance_with_short_numbers(
+    dtype: torch.dtype, atol: float, cosine: float
+) -> None:
+    p = problem((4, 5, 6), occupancy=0.8)
+    rounded = {
+        field.name: torch.tensor(getattr(p, field.name)).to(dtype).float().numpy()
+        for field in dataclasses.fields(p)
+        if field.name not in ("rows", "neighbours", "stencil")
+    }
+    p = p.with_(**rounded)
+    got = run(triton_update, p, dtype, DEVICE)
+    expected = run(reference.update, p, torch.float64)
+    assert_conforms(got, expected, atol=atol)
+    for name, exact in expected.items():
+        alike = (got[name] * exact).sum() / np.linalg.norm(got[name]) / np.linalg.norm(exact)
+        assert alike > cosine, name
+
+
+@needs_gpu
+@needs_triton
+@pytest.mark.parametrize(("precision", "atol"), [("tf32x3", 3e-6), ("tf32", 4e-3)])
+def test_tensor_cores_keep_the_tolerance_of_their_precision(precision: str, atol: float) -> None:
+    p = problem((16, 17, 12), hidden=128)
+    update = partial(triton_backend.update, precision=precision)
+    got = run(update, p, torch.float32, DEVICE)
+    assert_conforms(got, run(reference.update, p, torch.float64), atol=atol)
+
+
+@needs_triton
+def test_triton_results_are_the_same_bits_in_every_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    p = problem((24, 17, 30) if GPU else (4, 5, 7), occupancy=0.9)
+    first, second = (run(triton_update, p, torch.float32, DEVICE) for _ in range(2))
+    # One program that takes all tiles in turn sums the weights' gradients in another order.
+    monkeypatch.setattr(triton_backend, "PROGRAMS", 1)
+    alone = run(triton_update, p, torch.float32, DEVICE)
+    for name, array in first.items():
+        assert array.tobytes() == second[name].tobytes(), name
+    assert_conforms(alone, first)
+    for name in ("state", "to_state"):
+        assert alone[name].tobytes() == first[name].tobytes(), name
+
+
+@needs_triton
+def test_a_state_gone_wrong_stays_visible_and_local_with_triton() -> None:
+    p = problem((5, 4, 4), probability=1)
+    p.state[0, 3] = np.nan
+    wrong = np.isnan(run(triton_update, p, torch.float32, DEVICE)["state"]).any(axis=1)
+    np.testing.assert_array_equal(wrong[:-1], (p.neighbours == 0).any(axis=0))
+
+
+@needs_triton
+@pytest.mark.parametrize("probability", [0.5, 1.0])
+def test_the_mask_drawn_by_triton_has_the_same_bits(probability: float) -> None:
+    from vnca.kernels.update import triton_mask
+
+    hashes = np.random.default_rng(0).integers(0, 2**32, 3000, dtype=np.uint32)
+    on_device = torch.from_numpy(hashes.view(np.int32)).to(DEVICE)
+    for seed, step in ((0, 0), (2**31 + 5, 7), (-3, 2**32 - 1)):
+        options = {"seed": seed, "step": step, "probability": probability}
+        rows = triton_mask.changing_rows(on_device, **options).numpy(force=True)
+        np.testing.assert_array_equal(rows, changing_rows(hashes, **options))
+        assert rows.dtype == np.int32
 
 
 @needs_native
@@ -229,6 +337,31 @@ def test_arrays_that_do_not_fit_are_refused_by_name(
         spoiled.forward(out=np.empty_like(p.state))
     with pytest.raises(ShapeError, match=said):
         spoiled.backward()
+
+
+@needs_triton
+@pytest.mark.parametrize(
+    ("said", "spoil"),
+    [
+        ("state: expected shape", lambda p: {"state": p.state[:-1]}),
+        ("state: expected shape", lambda p: {"state": p.state[:, 0]}),
+        ("rows: expected int32", lambda p: {"rows": p.rows.astype(np.int64)}),
+        ("neighbours: expected shape", lambda p: {"neighbours": p.neighbours[:26]}),
+        ("priors: expected shape", lambda p: {"priors": p.priors[:-1]}),
+        ("hidden weights: expected", lambda p: {"hidden": p.hidden[:, :-1].copy()}),
+        ("hidden bias: expected shape", lambda p: {"bias": p.bias[:-1]}),
+        ("output weights: expected", lambda p: {"output": p.output.T.copy()}),
+        ("stencil: the Triton kernels", lambda p: {"stencil": p.stencil[::-1].copy()}),
+    ],
+)
+def test_tensors_that_do_not_fit_are_refused_by_name_with_triton(
+    said: str, spoil: Callable[[Problem], dict[str, AnyArray]]
+) -> None:
+    p = problem((2, 3, 4))
+    with pytest.raises(ShapeError, match=said):
+        run(triton_update, p.with_(**spoil(p)), torch.float32, DEVICE)
+    with pytest.raises(ShapeError, match="state: expected float32 or shorter"):
+        run(triton_update, p, torch.float64, DEVICE)
 
 
 @needs_native

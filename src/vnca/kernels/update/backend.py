@@ -10,37 +10,43 @@ from vnca.errors import BackendUnavailableError, OptionError
 from vnca.kernels.update import native
 from vnca.typing import FloatArray
 
-Backend = Literal["native", "reference"]
+Backend = Literal["native", "triton", "reference"]
 
 
 def choose(backend: str = "auto", *, device: str = "cpu") -> Backend:
-    """The backend to run; says once on stderr if `auto` has to settle for a slow one.
+    """The backend to run.
+
+    `auto` says once on stderr what it takes if that is no fast one, or if it computes on a GPU.
 
     Args:
-        backend: `auto`, `native` or `reference`.
+        backend: `auto`, `native`, `triton` or `reference`.
         device: Kind of device that holds the state, as torch names it.
 
     Raises:
         BackendUnavailableError: If the backend asked for, or any at all, cannot run here.
         OptionError: If there is no backend of that name.
     """
-    reasons = {"native": _native_unavailable(device), "reference": _reference_unavailable()}
     if backend == "auto":
-        if reasons["native"] is None:
-            return "native"
-        if reasons["reference"] is None:
-            _say_once(f"vnca: running the slow reference step: {reasons['native']}")
+        fast: Backend = "native" if device == "cpu" else "triton"
+        why_slow = _UNAVAILABLE[fast](device)
+        if why_slow is None:
+            if device != "cpu":
+                _say_once(f"vnca: running the {fast} step on {device}")
+            return fast
+        why_none = _UNAVAILABLE["reference"](device)
+        if why_none is None:
+            _say_once(f"vnca: running the slow reference step: {why_slow}")
             return "reference"
         raise BackendUnavailableError(
-            f"no backend can run the update step: native: {reasons['native']}; "
-            f"reference: {reasons['reference']}"
+            f"no backend can run the update step: {fast}: {why_slow}; reference: {why_none}"
         )
-    if backend not in reasons:
-        raise OptionError(f"backend: expected auto, {' or '.join(reasons)}, got {backend}")
-    reason = reasons[backend]
-    if reason is not None:
-        raise BackendUnavailableError(f"backend {backend} cannot run: {reason}")
-    return "native" if backend == "native" else "reference"
+    for name, unavailable in _UNAVAILABLE.items():
+        if backend == name:
+            reason = unavailable(device)
+            if reason is not None:
+                raise BackendUnavailableError(f"backend {backend} cannot run: {reason}")
+            return name
+    raise OptionError(f"backend: expected auto, {', '.join(_UNAVAILABLE)}, got {backend}")
 
 
 def torch_step(
@@ -50,10 +56,15 @@ def torch_step(
 
     `threads` counts for the native kernel only; the reference uses as many as torch does.
     """
-    if choose(backend, device=device) == "native":
+    chosen = choose(backend, device=device)
+    if chosen == "native":
         from vnca.kernels.update.native_autograd import update
 
         return partial(update, threads=threads)
+    if chosen == "triton":
+        from vnca.kernels.update.triton import update
+
+        return update
     from vnca.kernels.update.reference import update
 
     return update
@@ -62,8 +73,14 @@ def torch_step(
 def array_step(backend: str = "auto", *, threads: int | None = None) -> Callable[..., FloatArray]:
     """The step on arrays, called as `vnca.kernels.update.native.forward` is, up to `stencil`.
 
-    Of the backends only the reference uses torch, and as many threads as torch does.
+    Of the backends only the reference uses torch, and as many threads as torch does. Triton works
+    on tensors that stay on the GPU, not on arrays.
     """
+    if backend == "triton":
+        raise BackendUnavailableError(
+            "backend triton cannot run: it works on tensors on a GPU, not on arrays in main "
+            "memory; expected auto, native or reference"
+        )
     if choose(backend) == "native":
         return partial(native.forward, threads=threads)
     from vnca.kernels.update.reference import update_arrays
@@ -77,10 +94,28 @@ def _native_unavailable(device: str) -> str | None:
     return native.unavailable()
 
 
-def _reference_unavailable() -> str | None:
+def _triton_unavailable(device: str) -> str | None:
+    without_torch = _reference_unavailable(device)
+    if without_torch is not None:
+        return without_torch
+    from vnca.kernels.update.triton import unavailable
+
+    return unavailable(device)
+
+
+def _reference_unavailable(device: str) -> str | None:
     if importlib.util.find_spec("torch") is None:
         return "it needs torch; install vnca[train]"
     return None
+
+
+_UNAVAILABLE: dict[Backend, Callable[[str], str | None]] = {
+    "native": _native_unavailable,
+    "triton": _triton_unavailable,
+    "reference": _reference_unavailable,
+}
+"""Why a backend cannot run on a kind of device, or nothing; asked only of those that are needed:
+some answers take importing torch."""
 
 
 @cache

@@ -41,7 +41,16 @@ def changing_rows(cell_hashes: HashArray, *, seed: int, step: int, probability: 
     """
     if probability >= 1:
         return np.arange(len(cell_hashes), dtype=np.int32)
+    chosen = mix(cell_hashes ^ mask_key(seed, step)) < mask_threshold(probability)
+    return np.flatnonzero(chosen).astype(np.int32)
+
+
+def mask_key(seed: int, step: int) -> np.uint32:
+    """What the hashes of all cells are combined with in a step."""
     words = np.array([seed & 0xFFFFFFFF, step & 0xFFFFFFFF], dtype=np.uint32)
-    key = mix(words[:1] + mix(words[1:]))
-    threshold = np.uint32(round(probability * 2**32))
-    return np.flatnonzero(mix(cell_hashes ^ key) < threshold).astype(np.int32)
+    return mix(words[:1] + mix(words[1:]))[0]
+
+
+def mask_threshold(probability: float) -> np.uint32:
+    """The hash from which a cell does not change, for a probability under 1."""
+    return np.uint32(round(probability * 2**32))
