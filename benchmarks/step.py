@@ -7,14 +7,18 @@ grid, the others on the cells that live and change. Masks are drawn beforehand f
 Times are per living cell. GFLOP/s count the matrix products that a step or its gradient needs in
 the cells that change, the same for every backend: what one does beyond that, in cells that the
 mask drops or to compute a hidden layer again, lowers its share of the machine's peak.
+
+On a GPU (`--device cuda`) a time is that of a dozen calls in a row, divided, between two of the
+GPU's own events: launching a step is hidden behind the one before, as in a rollout.
 """
 
 import argparse
 import csv
+import dataclasses
 import json
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -37,16 +41,28 @@ from vnca.kernels.update.stencil import FILTERS, stencil
 from vnca.typing import FloatArray, Index, IntArray
 
 CHANNELS, PRIORS, PROBABILITY = 12, 7, 0.5
-BACKENDS = ("plain", "compile", "reference", "native")
+BACKENDS = ("plain", "compile", "reference", "native", "triton")
 PASSES = ("forward", "both")
+DTYPES = {"float32": torch.float32, "tf32": torch.float32} | {
+    name: getattr(torch, name) for name in ("float16", "bfloat16")
+}
+"""Of states, weights and products; `tf32` is float32 whose products may round to 10 bits."""
 ARRAYS = ("state", "gradient of the state", "gradient of W1", "gradient of b1", "gradient of W2")
-TOLERANCES = (1e-5, *[1e-3] * 4)
-"""Of ARRAYS: the norm of the difference from float64 over the norm. Gradients are given more: a
-hidden unit so near zero that rounding turns it on or off changes them by a jump."""
+TOLERANCES = {
+    "float32": (1e-5, 1e-3),
+    "tf32": (1e-3, 1e-2),
+    "float16": (1e-3, 1e-2),
+    "bfloat16": (1e-2, 5e-2),
+}
+"""For the state and for gradients: the norm of the difference from float64 over the norm.
+Gradients are given more: a hidden unit so near zero that rounding turns it on or off changes them
+by a jump."""
+CALLS = 12
+"""In a row on a GPU."""
 COLUMNS: list[str] = [
     *("date", "device", "threads", "torch", "vnca"),
-    *("backend", "pass", "grid", "hidden", "occupancy"),
-    *("ns_per_cell_min", "ns_per_cell", "ns_per_cell_max", "gflops", "share_of_peak"),
+    *("backend", "dtype", "pass", "grid", "hidden", "occupancy"),
+    *("ns_per_cell_min", "ns_per_cell", "ns_per_cell_max", "gflops", "share_of_peak", "peak_mb"),
 ]
 
 
@@ -88,6 +104,32 @@ class Case:
             normal(n + 1, CHANNELS),
         )
 
+    def rounded(self, dtype: torch.dtype) -> "Case":
+        """With values that a dtype can hold: what is compared is arithmetic, not input."""
+
+        def near(array: FloatArray) -> FloatArray:
+            return torch.from_numpy(array).to(dtype).float().numpy()
+
+        hidden, bias, output = map(near, self.weights)
+        return dataclasses.replace(
+            self,
+            state=near(self.state),
+            priors=near(self.priors),
+            weights=(hidden, bias, output),
+            gradient=near(self.gradient),
+        )
+
+
+class Place(NamedTuple):
+    """Where a backend computes, and with which numbers."""
+
+    device: str
+    dtype: torch.dtype
+
+    def tensor(self, values: FloatArray | Tensor) -> Tensor:
+        """A copy there."""
+        return torch.as_tensor(values).to(self.device, self.dtype, copy=True)
+
 
 class Backend(NamedTuple):
     """A step in a backend's own layout.
@@ -115,22 +157,24 @@ class Backend(NamedTuple):
         return result, *torch.autograd.grad(result, self.inputs, self.gradient)
 
 
-def plain(case: Case, *, compiled: bool = False) -> Backend:
+def plain(case: Case, place: Place, *, compiled: bool = False) -> Backend:
     """The step as the field writes it, on a dense grid `[1, C, x, y, z]`."""
     domain = case.domain
 
     def dense(values: FloatArray) -> Tensor:
         grid = torch.from_numpy(domain.scatter(values[: len(domain)], domain.box))
-        return grid.permute(3, 0, 1, 2)[None].contiguous()
+        return place.tensor(grid.permute(3, 0, 1, 2)[None].contiguous())
 
     def listed_state(grid: Tensor) -> Tensor:
-        cells = domain.gather(grid[0].permute(1, 2, 3, 0).numpy(force=True), domain.box.lower)
-        return functional.pad(torch.from_numpy(cells), (0, 0, 0, 1))
+        cells = grid[0].permute(1, 2, 3, 0).float().numpy(force=True)
+        return functional.pad(
+            torch.from_numpy(domain.gather(cells, domain.box.lower)), (0, 0, 0, 1)
+        )
 
     changing = np.zeros((len(domain), 1), dtype=np.float32)
     changing[case.rows] = 1
     mask, priors = dense(changing), dense(case.priors)
-    filters = torch.from_numpy(stencil())[1:].view(FILTERS - 1, 1, 3, 3, 3)
+    filters = place.tensor(stencil())[1:].view(FILTERS - 1, 1, 3, 3, 3)
     filters = filters.repeat(CHANNELS, 1, 1, 1, 1)
     # A depthwise convolution puts out all filters of a channel together, a rule all channels of a
     # filter: W1 is put in order once, beforehand.
@@ -151,77 +195,104 @@ def plain(case: Case, *, compiled: bool = False) -> Backend:
         to_hidden, to_output = to_first.flatten(1)[:, order.argsort()], to_second.flatten(1)
         return listed_state(grid), listed_state(to_grid), to_hidden, to_bias, to_output
 
-    hidden, bias, output = map(torch.from_numpy, case.weights)
+    hidden, bias, output = map(place.tensor, case.weights)
     first, second = (
         hidden[:, order].view(*hidden.shape, 1, 1, 1),
         output.view(*output.shape, 1, 1, 1),
     )
-    inputs = tuple(
-        t.requires_grad_() for t in (dense(case.state), first, bias.clone(), second.clone())
-    )
+    inputs = tuple(t.requires_grad_() for t in (dense(case.state), first, bias, second.clone()))
     return Backend(torch.compile(step) if compiled else step, inputs, dense(case.gradient), listed)
 
 
-def packaged(case: Case, name: str, *, threads: int, dtype: torch.dtype = torch.float32) -> Backend:
+def packaged(case: Case, name: str, place: Place, *, threads: int) -> Backend:
     """A backend of vnca, on the list of living cells."""
-    update = torch_step(name, threads=threads)
-
-    def tensor(array: FloatArray) -> Tensor:
-        return torch.tensor(array, dtype=dtype)
-
-    rows, neighbours = torch.from_numpy(case.rows), torch.from_numpy(case.domain.neighbours)
-    priors, filters = tensor(case.priors), tensor(stencil())
+    update = torch_step(name, device=place.device, threads=threads)
+    rows, neighbours = (
+        torch.from_numpy(array).to(place.device) for array in (case.rows, case.domain.neighbours)
+    )
+    priors = place.tensor(case.priors)
+    filters = torch.from_numpy(stencil()).to(
+        place.device, torch.promote_types(place.dtype, torch.float32)
+    )
 
     def step(state: Tensor, *weights: Tensor) -> Tensor:
         return update(state, rows, neighbours, priors, Weights(*weights), filters)
 
-    inputs = tuple(tensor(array).requires_grad_() for array in (case.state, *case.weights))
-    return Backend(step, inputs, tensor(case.gradient), lambda *results: results)
+    inputs = tuple(place.tensor(array).requires_grad_() for array in (case.state, *case.weights))
+    return Backend(step, inputs, place.tensor(case.gradient), lambda *results: results)
 
 
-def prepared(case: Case, name: str, threads: int) -> Backend:
+def prepared(case: Case, name: str, place: Place, threads: int) -> Backend:
     if name in ("plain", "compile"):
-        return plain(case, compiled=name == "compile")
-    return packaged(case, name, threads=threads)
+        return plain(case, place, compiled=name == "compile")
+    return packaged(case, name, place, threads=threads)
 
 
-def disagreements(case: Case, backends: dict[str, Backend]) -> list[str]:
+def disagreements(
+    case: Case, backends: dict[str, Backend], parts: list[str], device: str, dtype: str
+) -> list[str]:
     """What differs from the reference in float64, one line each; also warms everything up."""
-    reference = packaged(case, "reference", threads=1, dtype=torch.float64)
-    exact = [array.detach() for array in reference.both()]
+    reference = packaged(case, "reference", Place(device, torch.float64), threads=1)
+    exact = [
+        array.detach() for array in (reference.both() if "both" in parts else [reference.forward()])
+    ]
     found = []
     for name, backend in backends.items():
-        results = backend.both()
-        alone = backend.listed(backend.forward(), *results[1:])[0]
-        arrays = [("state without gradients", alone, exact[0], TOLERANCES[0])]
-        arrays += zip(ARRAYS, backend.listed(*results), exact, TOLERANCES, strict=True)
-        for array, got, expected, tolerance in arrays:
-            error = float(torch.linalg.norm(got.detach() - expected) / torch.linalg.norm(expected))
+        to_gradients = backend.both()[1:] if "both" in parts else backend.inputs
+        state, *gradients = backend.listed(backend.forward(), *to_gradients)
+        for array, got, expected in zip(ARRAYS, (state, *gradients), exact, strict=False):
+            tolerance = TOLERANCES[dtype][array != ARRAYS[0]]
+            difference = got.detach().to(expected) - expected
+            error = float(torch.linalg.norm(difference) / torch.linalg.norm(expected))
             if not error <= tolerance:
                 found.append(f"{name}: {array} is off by {error:.1e} (allowed: {tolerance:.0e})")
     return found
 
 
-def seconds(work: Callable[[], object]) -> float:
-    time.sleep(0.05)  # torch's threads spin for a while after their work, in the way of others
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
+def seconds(work: Callable[[], object], device: str) -> float:
+    if device == "cpu":
+        time.sleep(0.05)  # torch's threads spin for a while after their work, in others' way
+        start = time.perf_counter()
+        work()
+        return time.perf_counter() - start
+    begin, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
+    begin.record()
+    for _ in range(CALLS):
+        work()
+    end.record()
+    end.synchronize()
+    return begin.elapsed_time(end) / 1e3 / CALLS
 
 
 def measure(
-    backends: dict[str, Backend], repeats: int
+    backends: dict[str, Backend], parts: list[str], place: Place, repeats: int
 ) -> tuple[float, dict[tuple[str, str], list[float]]]:
     """The best GEMM in FLOP/s, and the seconds each backend took for each pass, in turns."""
-    size = 1024
-    left, right, product = (torch.rand(size, size) for _ in range(3))
-    peak, times = 0.0, {(name, part): [] for name in backends for part in PASSES}
+    size = 1024 if place.device == "cpu" else 8192
+    left, right, product = (place.tensor(torch.rand(size, size)) for _ in range(3))
+
+    def multiply() -> Tensor:
+        return torch.mm(left, right, out=product)
+
+    peak, times = 0.0, {(name, part): [] for name in backends for part in parts}
     for _ in range(repeats):
         for _ in range(4):
-            peak = max(peak, 2 * size**3 / seconds(lambda: torch.mm(left, right, out=product)))
+            peak = max(peak, 2 * size**3 / seconds(multiply, place.device))
         for (name, part), taken in times.items():
-            taken.append(seconds(getattr(backends[name], part)))
+            taken.append(seconds(getattr(backends[name], part), place.device))
     return peak, times
+
+
+def peak_memory(work: Callable[[], object], device: str) -> float | None:
+    """Megabytes of the GPU's memory that a pass takes beyond its inputs."""
+    if device == "cpu":
+        return None
+    torch.cuda.synchronize()
+    before = torch.cuda.memory_allocated()
+    torch.cuda.reset_peak_memory_stats()
+    work()
+    torch.cuda.synchronize()
+    return round((torch.cuda.max_memory_allocated() - before) / 1e6, 1)
 
 
 def needed_flop(hidden: int) -> dict[str, int]:
@@ -231,7 +302,9 @@ def needed_flop(hidden: int) -> dict[str, int]:
     return {"forward": forward, "both": forward + backward}
 
 
-def device() -> str:
+def device_name(device: str) -> str:
+    if device != "cpu":
+        return torch.cuda.get_device_name()
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
@@ -259,93 +332,123 @@ def fraction(text: str) -> float:
     return float(text)
 
 
-def names(text: str) -> list[str]:
-    chosen = text.split(",")
-    if unknown := set(chosen) - set(BACKENDS):
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: not among {', '.join(BACKENDS)}")
-    return chosen
+def among(known: Collection[str]) -> Callable[[str], list[str]]:
+    def names(text: str) -> list[str]:
+        chosen = text.split(",")
+        if unknown := set(chosen) - set(known):
+            raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: not among {', '.join(known)}")
+        return chosen
+
+    return names
 
 
-def main() -> None:
+def arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--grid", type=shape, default="64x64x64", metavar="XxYxZ")
     parser.add_argument("--hidden", type=positive, default=128)
     parser.add_argument("--occupancy", type=fraction, default=1.0, help="share of cells that live")
-    parser.add_argument(
-        "--backends", type=names, default="plain,reference,native", help=", ".join(BACKENDS)
-    )
+    parser.add_argument("--backends", type=among(BACKENDS), help=", ".join(BACKENDS))
+    parser.add_argument("--passes", type=among(PASSES), default="forward,both")
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
+    parser.add_argument("--dtypes", type=among(DTYPES), default="float32", help=", ".join(DTYPES))
     parser.add_argument("--threads", type=positive, default=2)
     parser.add_argument("--repeats", type=positive, default=5)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="append the rows to this")
-    options = parser.parse_args()
-    torch.set_num_threads(options.threads)
+    return parser
 
-    case = Case.draw(options.grid, options.hidden, options.occupancy)
-    try:
-        backends = {name: prepared(case, name, options.threads) for name in options.backends}
-        found = disagreements(case, backends)
-    except VncaError as error:
-        parser.error(str(error))
-    if found:
+
+def timed(
+    case: Case, dtype: str, options: argparse.Namespace
+) -> tuple[float, list[dict[str, Any]]]:
+    """The GEMM's peak in FLOP/s, and a row for each backend and pass.
+
+    Raises:
+        SystemExit: If backends disagree.
+    """
+    torch.set_float32_matmul_precision("high" if dtype == "tf32" else "highest")
+    torch.backends.cudnn.allow_tf32 = dtype == "tf32"
+    place = Place(options.device, DTYPES[dtype])
+    case = case.rounded(place.dtype)
+    backends = {name: prepared(case, name, place, options.threads) for name in options.backends}
+    if found := disagreements(case, backends, options.passes, options.device, dtype):
         raise SystemExit("\n".join([*found, "nothing was timed: the backends disagree"]))
-    peak, times = measure(backends, options.repeats)
-
-    alive, changing = len(case.domain), len(case.rows)
-    run = {
-        "date": datetime.now(timezone.utc).date().isoformat(),
-        "device": device(),
-        "threads": options.threads,
-        "torch": torch.__version__,
-        "vnca": vnca.__version__,
-        "gemm_gflops": round(peak / 1e9, 1),
-    }
-    rows: list[dict[str, Any]] = []
+    peak, times = measure(backends, options.passes, place, options.repeats)
+    alive = len(case.domain)
+    rows = []
     for (name, part), taken in times.items():
-        rate = changing * needed_flop(options.hidden)[part] / median(taken)
+        rate = len(case.rows) * needed_flop(options.hidden)[part] / median(taken)
         rows.append(
             {
                 "backend": name,
-                "dtype": "float32",
+                "dtype": dtype,
                 "pass": part,
                 "grid": "x".join(map(str, options.grid)),
                 "hidden": options.hidden,
                 "occupancy": round(alive / float(np.prod(options.grid)), 4),
-                "ns_per_cell_min": round(min(taken) * 1e9 / alive, 2),
-                "ns_per_cell": round(median(taken) * 1e9 / alive, 2),
-                "ns_per_cell_max": round(max(taken) * 1e9 / alive, 2),
+                "ns_per_cell_min": round(min(taken) * 1e9 / alive, 4),
+                "ns_per_cell": round(median(taken) * 1e9 / alive, 4),
+                "ns_per_cell_max": round(max(taken) * 1e9 / alive, 4),
                 "gflops": round(rate / 1e9, 2),
                 "share_of_peak": round(rate / peak, 4),
+                "gemm_gflops": round(peak / 1e9, 1),
+                "peak_mb": peak_memory(getattr(backends[name], part), options.device),
             }
         )
+    return peak, rows
 
-    print(f"{run['device']}, {options.threads} threads, torch {run['torch']}, vnca {run['vnca']}")
+
+def show(dtype: str, peak: float, rows: list[dict[str, Any]]) -> None:
     print(
-        f"{rows[0]['grid']} cells, {alive} alive, {changing} of them change; {CHANNELS} channels, "
-        f"hidden {options.hidden}, float32; GEMM peak {run['gemm_gflops']} GFLOP/s"
-    )
-    print(
-        f"all agree with the reference in float64: states to {TOLERANCES[0]:.0e}, "
-        f"gradients to {TOLERANCES[1]:.0e} of their norm"
+        f"{dtype}: GEMM peak {peak / 1e9:.1f} GFLOP/s; all agree with the reference in float64: "
+        "states to {:.0e}, gradients to {:.0e} of their norm".format(*TOLERANCES[dtype])
     )
     print("backend   pass        ns a cell (min to max)         GFLOP/s   of peak   against plain")
+    plain = {row["pass"]: row["ns_per_cell"] for row in rows if row["backend"] == "plain"}
     for row in rows:
-        baseline = times.get(("plain", row["pass"]))
-        spread = f"({row['ns_per_cell_min']:.1f} to {row['ns_per_cell_max']:.1f})"
-        gain = ""
-        if baseline is not None:
-            gain = f"{median(baseline) / median(times[row['backend'], row['pass']]):.1f}×"
+        spread = f"({row['ns_per_cell_min']:.3g} to {row['ns_per_cell_max']:.3g})"
+        gain = f"{plain[row['pass']] / row['ns_per_cell']:.1f}×" if plain else ""
         print(
-            f"{row['backend']:<9} {row['pass']:<8} {row['ns_per_cell']:>9.1f} {spread:<22}"
-            f"{row['gflops']:>7.1f}   {row['share_of_peak']:>7.1%}   {gain:>13}"
+            f"{row['backend']:<9} {row['pass']:<8} {row['ns_per_cell']:>9.4g} {spread:<22}"
+            f"{row['gflops']:>9.1f} {row['share_of_peak']:>7.1%}   {gain:>13}"
         )
+
+
+def main() -> None:
+    parser = arguments()
+    options = parser.parse_args()
+    on_gpu = options.device == "cuda"
+    options.backends = options.backends or ["plain", "reference", "triton" if on_gpu else "native"]
+    torch.set_num_threads(options.threads)
+    case = Case.draw(options.grid, options.hidden, options.occupancy)
+    run = {
+        "date": datetime.now(timezone.utc).date().isoformat(),
+        "device": device_name(options.device),
+        "threads": options.threads,
+        "torch": torch.__version__,
+        "vnca": vnca.__version__,
+    }
+    print(f"{run['device']}, {options.threads} threads, torch {run['torch']}, vnca {run['vnca']}")
+    print(
+        f"{'x'.join(map(str, options.grid))} cells, {len(case.domain)} alive, {len(case.rows)} of "
+        f"them change; {CHANNELS} channels, hidden {options.hidden}"
+    )
+    rows: list[dict[str, Any]] = []
+    for dtype in options.dtypes:
+        try:
+            peak, more = timed(case, dtype, options)
+        except VncaError as error:
+            parser.error(str(error))
+        show(dtype, peak, more)
+        rows += more
 
     for path in filter(None, (options.json, options.csv)):
         path.parent.mkdir(parents=True, exist_ok=True)
     if options.json is not None:
-        options.json.write_text(json.dumps({**run, "rows": rows}, indent=2) + "\n")
+        document = {**run, "gemm_gflops": rows[0]["gemm_gflops"], "rows": rows}
+        options.json.write_text(json.dumps(document, indent=2) + "\n")
     if options.csv is not None:
         begun = options.csv.exists()
         with options.csv.open("a", newline="") as file:
