@@ -88,7 +88,7 @@ class TrainConfig:
     """Weight of the penalty on states beyond ±1."""
     features: str = "edges"
     """Weights of VGG16: edges, imagenet or a path."""
-    backend: Literal["auto", "native", "reference"] = "auto"
+    backend: Literal["auto", "native", "triton", "reference"] = "auto"
     """What computes the automaton."""
     seed: int = 0
     """Same seed, same machine, same result."""
