@@ -163,6 +163,8 @@ def _train(options: Train, run_folder: RunFolder, checkpoint: Checkpoint | None 
             f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
             f"features '{vgg.name}', {device}"
         )
+        if options.config.motion.weight and not trainer.scene.moves:
+            say(f"{options.frame}: no velocity in this frame; its texture is not taught to move")
         session.improve()
     return options.out
 

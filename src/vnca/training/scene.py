@@ -22,8 +22,9 @@ class Scene:
 
     Attributes:
         domain: The cells that live.
-        rows: `[27, n]` neighbours of each cell.
+        neighbours: `[27, n]` rows of the state around each cell.
         priors: `[n, 7]`.
+        moves: Whether the smoke has any velocity.
     """
 
     def __init__(self, smoke: Volume, rule: Rule, *, device: torch.device | str = "cpu") -> None:
@@ -50,10 +51,11 @@ class Scene:
         self.priors = torch.from_numpy(priors(self.domain, smoke, rule)).to(device)
         density = self.domain.gather(smoke.density, smoke.origin) / rule.scales.density
         self._density = torch.from_numpy(density.astype(np.float32)).to(device)
-        self._velocity: Tensor | None = None
+        velocity = np.zeros((len(self.domain), 3), dtype=np.float32)
         if smoke.velocity is not None:
-            velocity = self.domain.gather(smoke.velocity, smoke.origin).astype(np.float32)
-            self._velocity = torch.from_numpy(velocity).to(device)
+            velocity[:] = self.domain.gather(smoke.velocity, smoke.origin)
+        self.moves = bool(velocity.any())
+        self._velocity = torch.from_numpy(velocity).to(device)
         at = self.domain.cells - np.asarray(self.domain.box.lower)
         flat = np.ravel_multi_index(tuple(at.T), self.domain.box.shape)
         self._flat = torch.from_numpy(flat).to(device)
@@ -101,13 +103,7 @@ class Scene:
     def motion(
         self, state: Tensor, camera: Camera, view: ViewConfig, *, size: int, offset: float = 0.0
     ) -> tuple[Tensor, Tensor]:
-        """How the smoke that `look` shows moves: pixels per frame `[r, c, 2]`, and opacity.
-
-        Raises:
-            GridError: If the frame has no velocity.
-        """
-        if self._velocity is None:
-            raise GridError("the frame has no velocity: its motion cannot be seen")
+        """How the smoke that `look` shows moves: pixels per frame `[r, c, 2]`, and opacity."""
         return projected_velocity(
             self._painted_density(state),
             self._dense(self._velocity),
@@ -119,11 +115,6 @@ class Scene:
             offset=offset,
             mode=view.mode,
         )
-
-    @property
-    def moves(self) -> bool:
-        """Whether the frame has a velocity."""
-        return self._velocity is not None
 
     def _painted_density(self, state: Tensor) -> Tensor:
         change = state[:-1, DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
