@@ -15,6 +15,7 @@ COMMANDS = {
     "simulate": "write a smoke simulation to play with",
     "train": "learn a rule from one frame of smoke and one picture",
     "stylize": "paint a smoke sequence with a trained rule",
+    "texture": "grow solid textures and put them on meshes",
     "render": "make a film or a turntable of a sequence",
     "info": "describe a volume file, a model or a training run",
 }

@@ -1,0 +1,244 @@
+"""Solid textures from a trained rule and by optimising blocks, compared on the same pictures.
+
+Run `python benchmarks/texturing/compare.py --styles picture.jpg …`. For each picture a rule is
+trained and grown into blocks of all sizes; the baseline optimises a block of each size of
+`--sizes` for as long. Both are judged by the appearance loss on the same slices: along the axes,
+at angles that training draws, and at angles (`unseen`) that it never does. Each measurement runs
+in a process of its own, whose peak memory is told, the libraries included.
+"""
+
+import argparse
+import csv
+import json
+import platform
+import resource
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from itertools import count
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import torch
+from solid import optimised_blocks
+
+import vnca
+from vnca.automaton.model import Model
+from vnca.automaton.rule import Rule
+from vnca.automaton.stepper import stepper
+from vnca.features.vgg import VGG16
+from vnca.io.image import read_image
+from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
+from vnca.texturing.block import border_jump, grow
+from vnca.texturing.config import PRESETS
+from vnca.texturing.distance import slice_distances
+from vnca.texturing.loop import TextureTrainer
+from vnca.texturing.scene import BlockScene
+from vnca.typing import FloatArray
+
+COLUMNS = (
+    "date", "device", "threads", "torch", "vnca", "features", "style", "method", "size",
+    "iterations", "learn_s", "make_s", "peak_mb", "axis", "oblique", "unseen", "unseen_ratio",
+    "border_jump",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a measurement needs to know."""
+
+    style: Path
+    preset: str
+    features: str
+    threads: int
+    seconds: float
+    iterations: int | None
+    slices: int
+    steps: int
+    seed: int
+
+    @property
+    def slice_size(self) -> int:
+        """Rows and columns of a slice."""
+        return PRESETS[self.preset].slices.size
+
+    def begin(self) -> tuple[FloatArray, VGG16]:
+        """The picture and the network, in the process that measures."""
+        torch.set_num_threads(self.threads)
+        return read_image(self.style), VGG16.load(self.features)
+
+    def done(self, started: float, iterations: int) -> bool:
+        """Whether learning has had its time."""
+        if self.iterations is not None:
+            return iterations >= self.iterations
+        return time.perf_counter() - started >= self.seconds
+
+
+def train(task: Task) -> tuple[Rule, dict[str, Any]]:
+    """A rule trained for the time given; its learning rate falls as over that time."""
+    style, vgg = task.begin()
+    config = replace(PRESETS[task.preset], features=task.features, seed=task.seed)
+    scene = BlockScene(config.block, config.slices)
+    if task.iterations is None:
+        trial = TextureTrainer(scene, style, config, vgg)
+        trial.improve()
+        began = time.perf_counter()
+        for _ in range(8):
+            trial.improve()
+        pace = (time.perf_counter() - began) / 8
+        config = replace(config, iterations=max(1, round(task.seconds / pace)))
+    else:
+        config = replace(config, iterations=task.iterations)
+    trainer = TextureTrainer(scene, style, config, vgg)
+    began = time.perf_counter()
+    for _ in trainer.run():
+        pass
+    learned = time.perf_counter() - began
+    return trainer.rule(), {"iterations": config.iterations, "learn_s": round(learned, 1)}
+
+
+def grown(task: Task, rule: Rule, size: int) -> dict[str, Any]:
+    """A block of a trained rule, and how near its slices come."""
+    style, vgg = task.begin()
+    step = stepper(rule, threads=task.threads)
+    began = time.perf_counter()
+    block = next(grow(rule, step, size, steps=task.steps, seed=task.seed))
+    made = time.perf_counter() - began
+    return {"make_s": round(made, 1), "peak_mb": peak_mb(), **judged(task, block, style, vgg)}
+
+
+def optimised(task: Task, size: int) -> dict[str, Any]:
+    """A block of the baseline, and how near its slices come."""
+    style, vgg = task.begin()
+    appearance = AppearanceLoss(vgg, style, AppearanceConfig(), task.slice_size)
+    blocks = optimised_blocks(style, appearance, size, slice_size=task.slice_size, seed=task.seed)
+    began = time.perf_counter()
+    for iterations, block in zip(count(1), blocks, strict=False):  # noqa: B007
+        if task.done(began, iterations):
+            break
+    made = time.perf_counter() - began
+    return {
+        "iterations": iterations,
+        "learn_s": 0.0,
+        "make_s": round(made, 1),
+        "peak_mb": peak_mb(),
+        **judged(task, block, style, vgg),
+    }
+
+
+def judged(task: Task, block: FloatArray, style: FloatArray, vgg: VGG16) -> dict[str, Any]:
+    appearance = AppearanceLoss(vgg, style, AppearanceConfig(), task.slice_size)
+    found = slice_distances(block, appearance, size=task.slice_size, count=task.slices, seed=1)
+    totals = {name: distance.total for name, distance in found.items()}
+    seen = (totals["axis"] + totals["oblique"]) / 2
+    return {
+        **{name: round(total, 3) for name, total in totals.items()},
+        "unseen_ratio": round(totals["unseen"] / seen, 3),
+        "border_jump": round(border_jump(block), 3),
+    }
+
+
+def peak_mb() -> int:
+    """Most memory this process has had; Linux counts in KiB."""
+    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+
+
+def alone(work: Callable[..., Any], *arguments: Any) -> Any:
+    """The result of work in a process of its own."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(work, *arguments).result()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--styles", type=Path, nargs="+", required=True, metavar="PICTURE")
+    parser.add_argument(
+        "--runs", type=Path, nargs="+", metavar="RUN", help="one a picture, instead of training"
+    )
+    parser.add_argument("--sizes", type=int, nargs="+", default=[64, 128])
+    parser.add_argument(
+        "--grow", type=int, nargs="*", default=[256], help="further sizes for the rule alone"
+    )
+    parser.add_argument("--preset", choices=PRESETS, default="draft")
+    parser.add_argument("--seconds", type=float, default=600.0, help="of learning, for each method")
+    parser.add_argument("--iterations", type=int, help="of learning, instead of --seconds")
+    parser.add_argument("--steps", type=int, default=96, help="to grow a block")
+    parser.add_argument("--slices", type=int, default=16, help="of each kind that judge a block")
+    parser.add_argument("--features", default="edges")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="append the rows to this")
+    options = parser.parse_args()
+    if options.runs and len(options.runs) != len(options.styles):
+        parser.error("--runs: as many as --styles are needed")
+
+    run = {
+        "date": datetime.now(timezone.utc).date().isoformat(),
+        "device": processor(),
+        "threads": options.threads,
+        "torch": torch.__version__,
+        "vnca": vnca.__version__,
+        "features": options.features,
+    }
+    print(f"{run['device']}, {run['threads']} threads, torch {run['torch']}, vnca {run['vnca']}")
+    print(
+        f"{'style':<32}{'method':<11}{'size':>5}{'learn s':>9}{'make s':>8}{'MB':>7}"
+        f"{'axis':>8}{'oblique':>9}{'unseen':>8}{'ratio':>7}{'jump':>7}"
+    )
+    rows: list[dict[str, Any]] = []
+
+    def tell(task: Task, method: str, size: int, found: dict[str, Any]) -> None:
+        rows.append({**run, "style": task.style.name, "method": method, "size": size, **found})
+        print(
+            f"{task.style.name:<32}{method:<11}{size:>5}{found['learn_s']:>9}{found['make_s']:>8}"
+            f"{found['peak_mb']:>7}{found['axis']:>8}{found['oblique']:>9}{found['unseen']:>8}"
+            f"{found['unseen_ratio']:>7}{found['border_jump']:>7}",
+            flush=True,
+        )
+
+    for place, style in enumerate(options.styles):
+        task = Task(
+            style, options.preset, options.features, options.threads, options.seconds,
+            options.iterations, options.slices, options.steps, options.seed,
+        )  # fmt: skip
+        if options.runs:
+            model = Model.load(options.runs[place])
+            rule = model.rule
+            learned = {"iterations": model.training.get("iterations"), "learn_s": "given"}
+        else:
+            rule, learned = alone(train, task)
+        for size in [*options.sizes, *options.grow]:
+            tell(task, "automaton", size, {**learned, **alone(grown, task, rule, size)})
+        for size in options.sizes:
+            tell(task, "optimised", size, alone(optimised, task, size))
+
+    for path in filter(None, (options.json, options.csv)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    if options.json is not None:
+        options.json.write_text(json.dumps(rows, indent=2) + "\n")
+    if options.csv is not None:
+        begun = options.csv.exists()
+        with options.csv.open("a", newline="") as file:
+            table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+            if not begun:
+                table.writeheader()
+            table.writerows(rows)
+
+
+def processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(models, platform.processor() or platform.machine())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""Growing a block of solid texture, as the subcommands of `vnca texture` do."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from vnca.automaton.model import Model
+from vnca.automaton.rule import Rule
+from vnca.automaton.stepper import Step, stepper
+from vnca.cli.options import say
+from vnca.cli.progress import Progress
+from vnca.errors import OptionError
+from vnca.texturing.block import LARGEST, SMALLEST, grow
+from vnca.typing import FloatArray, IntArray
+
+KIND = "texture"
+"""What the model of a solid texture says it is, under `kind` in its record of training."""
+
+
+@dataclass(frozen=True)
+class BlockConfig:
+    """The block that is grown."""
+
+    block: int = 128
+    """Cells along an edge of the block; the larger, the later the pattern repeats."""
+    steps: int = 96
+    """Steps of the automaton from nothing to the texture."""
+    steps_per_frame: int | None = None
+    """Steps between two pictures of a living texture; the rule's own pace unless given."""
+    seed: int = 0
+    """Same seed, same machine, same block."""
+    backend: Literal["auto", "native", "reference"] = "auto"
+    """What computes the automaton."""
+
+    def __post_init__(self) -> None:
+        if not SMALLEST <= self.block <= LARGEST:
+            raise OptionError(f"--block {self.block}: must be from {SMALLEST} to {LARGEST} cells")
+        if self.steps < 1:
+            raise OptionError(f"--steps {self.steps}: at least 1 is needed")
+        if self.steps_per_frame is not None and self.steps_per_frame < 0:
+            raise OptionError(f"--steps-per-frame {self.steps_per_frame}: must not be negative")
+
+
+def texture_rule(path: Path) -> Rule:
+    """The rule of a model; says so if it was not trained as a texture.
+
+    Raises:
+        VncaError: If the model cannot be read.
+    """
+    model = Model.load(path)
+    if model.training.get("kind") != KIND:
+        say(f"{path}: was trained on smoke, not as a texture (vnca texture train)")
+    return model.rule
+
+
+def grown_blocks(rule: Rule, config: BlockConfig, count: int = 1) -> Iterator[FloatArray]:
+    """`count` blocks, linear RGB `[s, s, s, 3]`: the first grown from nothing, and its later life.
+
+    Raises:
+        BackendUnavailableError: If the kernel cannot run.
+    """
+    pause = config.steps_per_frame
+    if pause is None:
+        pause = rule.config.steps_per_frame
+    total = config.steps + (count - 1) * pause
+    with Progress(f"growing {config.block}³ cells,", total, "steps") as progress:
+        step = _counted(stepper(rule, config.backend), progress)
+        blocks = grow(rule, step, config.block, steps=config.steps, seed=config.seed, pause=pause)
+        for _ in range(count):
+            yield next(blocks)
+
+
+def _counted(step: Step, progress: Progress) -> Step:
+    done = 0
+
+    def counted(
+        state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
+    ) -> FloatArray:
+        nonlocal done
+        state = step(state, rows, neighbours, priors)
+        done += 1
+        progress.show(done)
+        return state
+
+    return counted

@@ -1,0 +1,80 @@
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from vnca.automaton.rule import Rule
+from vnca.automaton.stepper import Step
+from vnca.errors import OptionError
+from vnca.texturing.block import block_domain, border_jump, grow, sample_block
+from vnca.typing import FloatArray
+
+
+@pytest.fixture(scope="module")
+def block(rule: Rule, step: Step) -> FloatArray:
+    return next(grow(rule, step, 16, steps=12, seed=5))
+
+
+def test_a_block_holds_colours_that_can_be_shown(block: FloatArray) -> None:
+    assert block.shape == (16, 16, 16, 3)
+    assert block.dtype == np.float32
+    assert block.min() >= 0
+    assert block.max() <= 1
+    assert block.std() > 0.01
+
+
+def test_the_block_tiles_without_a_jump_at_its_border(block: FloatArray) -> None:
+    assert border_jump(block) == pytest.approx(1, abs=0.1)
+    cut = np.concatenate([block[:8] * 0.2, block[8:]])
+    assert border_jump(cut) > 1.2
+
+
+def test_the_automaton_does_not_know_where_the_border_is(rule: Rule, step: Step) -> None:
+    """With all cells changing in every step, a shifted beginning gives a shifted block."""
+    always = replace(rule.config, update_probability=1.0)
+    domain = block_domain(8)
+    random = np.random.default_rng(0)
+    dense = random.normal(0, 0.2, (8, 8, 8, always.channels)).astype(np.float32)
+
+    def rolled(start: FloatArray) -> FloatArray:
+        state = np.append(domain.gather(start, (0, 0, 0)), np.zeros((1, always.channels), "f"), 0)
+        rows = np.arange(len(domain), dtype=np.int32)
+        for _ in range(4):
+            state = step(state, rows, domain.neighbours, np.zeros((len(domain), 7), np.float32))
+        return domain.scatter(state[:-1], domain.box)
+
+    shifted = rolled(np.roll(dense, (3, 5, 1), (0, 1, 2)))
+    np.testing.assert_allclose(shifted, np.roll(rolled(dense), (3, 5, 1), (0, 1, 2)), atol=1e-5)
+
+
+def test_same_seed_same_block_and_another_seed_another(rule: Rule, step: Step) -> None:
+    one, two, other = (next(grow(rule, step, 8, steps=6, seed=s)) for s in (1, 1, 2))
+    np.testing.assert_array_equal(one, two)
+    assert not np.array_equal(one, other)
+
+
+def test_a_block_lives_on_in_even_steps(rule: Rule, step: Step) -> None:
+    first, second, third = islice(grow(rule, step, 8, steps=4, pause=3), 3)
+    assert not np.array_equal(first, second)
+    np.testing.assert_array_equal(second, next(grow(rule, step, 8, steps=7)))
+    np.testing.assert_array_equal(third, next(grow(rule, step, 8, steps=10)))
+    still, same = islice(grow(rule, step, 8, steps=4), 2)
+    np.testing.assert_array_equal(still, same)
+
+
+def test_sampling_agrees_with_scipy_also_far_outside(block: FloatArray) -> None:
+    points = np.random.default_rng(0).uniform(-50, 50, (500, 3))
+    expected = np.stack(
+        [map_coordinates(block[..., c], points.T, order=1, mode="grid-wrap") for c in range(3)], -1
+    )
+    np.testing.assert_allclose(sample_block(block, points), expected, atol=1e-5)
+    cells = np.argwhere(np.ones((16, 16, 16)))
+    np.testing.assert_array_equal(sample_block(block, cells), block.reshape(-1, 3))
+
+
+@pytest.mark.parametrize("size", [0, 7, 10**6])
+def test_blocks_that_cannot_be_grown_are_refused(rule: Rule, step: Step, size: int) -> None:
+    with pytest.raises(OptionError, match="expected from"):
+        next(grow(rule, step, size, steps=1))

@@ -1,0 +1,113 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from vnca.automaton.rule import DENSITY_CHANGE
+from vnca.features.vgg import VGG16
+from vnca.texturing.config import PoolConfig, TextureConfig
+from vnca.texturing.loop import TextureTrainer
+from vnca.texturing.preview import preview_sheet
+from vnca.texturing.scene import BlockScene
+from vnca.typing import FloatArray
+
+Make = Callable[..., TextureTrainer]
+
+
+@pytest.fixture
+def trainer(style: FloatArray, tiny_config: TextureConfig, vgg: VGG16) -> Make:
+    """Makes a trainer of the tiny training with some options changed."""
+
+    def make(**options: object) -> TextureTrainer:
+        config = replace(tiny_config, **options)  # type: ignore[arg-type]
+        return TextureTrainer(BlockScene(config.block, config.slices), style, config, vgg)
+
+    return make
+
+
+def weights(trainer: TextureTrainer) -> list[FloatArray]:
+    rule = trainer.rule()
+    return [rule.hidden, rule.bias, rule.output]
+
+
+def same(a: TextureTrainer, b: TextureTrainer) -> bool:
+    return all(map(np.array_equal, weights(a), weights(b)))
+
+
+def test_training_brings_slices_nearer_to_the_style(trainer: Make) -> None:
+    learning = trainer(
+        iterations=50, shortest_rollout=6, longest_rollout=6, learning_rate=6e-3, rate_warmup=10
+    )
+    losses = [step.loss for step in learning.run()]
+    assert np.median(losses[-10:]) < 0.85 * losses[0]
+
+
+def test_same_seed_same_weights_and_another_seed_others(trainer: Make) -> None:
+    one, two, other = trainer(seed=7), trainer(seed=7), trainer(seed=8)
+    for training in (one, two, other):
+        list(training.run())
+    assert same(one, two)
+    assert not same(one, other)
+
+
+def test_looking_at_previews_changes_nothing(trainer: Make, style: FloatArray) -> None:
+    looked, unseen = trainer(), trainer()
+    for _ in looked.run():
+        assert preview_sheet(looked, style).ndim == 3
+    list(unseen.run())
+    assert same(looked, unseen)
+
+
+def test_smoke_painted_with_a_texture_keeps_its_density(trainer: Make) -> None:
+    training = trainer(iterations=4)
+    list(training.run())
+    rule = training.rule()
+    assert not rule.output[DENSITY_CHANGE].any()
+    assert rule.output[[0, 1, 2, 4, 5]].any(1).all()
+    assert not training.grow(3)[:, DENSITY_CHANGE].any()
+
+
+def test_cells_that_know_nothing_begin_to_learn_at_once(trainer: Make) -> None:
+    training = trainer(iterations=1)
+    list(training.run())
+    assert training.rule().output.any()
+
+
+def test_terms_are_told_and_add_up(trainer: Make) -> None:
+    step = trainer().improve()
+    assert set(step.terms) == {"style", "moments", "pixels", "overflow"}
+    assert sum(step.terms.values()) == pytest.approx(step.loss, rel=1e-5)
+
+
+def test_exploded_states_are_told_and_do_not_stay(trainer: Make) -> None:
+    training = trainer(
+        iterations=8, learning_rate=50.0, pool=PoolConfig(size=2, reseed_every=10**9, limit=2.0)
+    )
+    steps = list(training.run())
+    assert any(step.exploded for step in steps)
+    assert all(state.abs().max() <= 2 for state in training._pool.values())
+    assert all(np.isfinite(w).all() for w in weights(training))
+
+
+def test_states_live_on_from_iteration_to_iteration(trainer: Make) -> None:
+    training = trainer(iterations=3, pool=PoolConfig(size=1, reseed_every=10**9))
+    starts: list[bool] = []
+    roll = training._roll
+
+    def look(state: torch.Tensor, steps: range) -> torch.Tensor:
+        starts.append(bool(state.any()))
+        return roll(state, steps)
+
+    training._roll = look  # type: ignore[method-assign,assignment]
+    list(training.run())
+    assert starts == [False, False, True]
+
+
+def test_the_native_kernel_and_the_reference_learn_alike(trainer: Make) -> None:
+    native, reference = (trainer(iterations=2, backend=name) for name in ("native", "reference"))
+    for training in (native, reference):
+        list(training.run())
+    for ours, theirs in zip(weights(native), weights(reference), strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=2e-4)

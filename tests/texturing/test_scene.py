@@ -1,0 +1,100 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from vnca.io.mesh import read_mesh
+from vnca.texturing.config import SliceConfig
+from vnca.texturing.scene import BlockScene, mesh_views
+
+BACKGROUND = torch.tensor([0.1, 0.2, 0.3])
+
+
+def state_of(scene: BlockScene) -> torch.Tensor:
+    random = torch.Generator().manual_seed(0)
+    state = scene.seed(6)
+    state[:-1] = 0.4 * torch.rand(len(state) - 1, 6, generator=random)
+    return state
+
+
+def test_cells_are_told_nothing_and_see_across_the_border() -> None:
+    scene = BlockScene(8, SliceConfig(size=32, count=1))
+    assert not scene.priors.any()
+    assert (scene.neighbours < len(scene.domain)).all()
+
+
+def test_the_block_is_the_state_in_its_place() -> None:
+    scene = BlockScene(8, SliceConfig(size=32, count=1))
+    state = scene.seed(6)
+    cell = (scene.domain.cells == (1, 2, 3)).all(1).argmax()
+    state[cell, :3] = torch.tensor([0.5, -0.5, 0.0])
+    block = scene.block(state)
+    torch.testing.assert_close(block[1, 2, 3], torch.tensor([1.0, 0.0, 0.2140]), atol=1e-3, rtol=0)
+    assert (block[0, 0, 0] == block[7, 7, 7]).all()
+
+
+def test_slices_fill_the_picture_and_teach_the_colours() -> None:
+    scene = BlockScene(8, SliceConfig(size=32, count=1))
+    state = state_of(scene).requires_grad_()
+    picture, opacity = scene.pictures(state, np.random.default_rng(0), BACKGROUND)
+    assert picture.shape == (1, 3, 32, 32)
+    assert (opacity == 1).all()
+    picture.sum().backward()
+    assert state.grad is not None
+    assert state.grad[:-1, :3].any()
+    assert not state.grad[:-1, 3:].any()
+
+
+def test_as_many_slices_are_cut_as_asked() -> None:
+    scene = BlockScene(8, SliceConfig(size=32, count=3))
+    pictures, opacity = scene.pictures(state_of(scene), np.random.default_rng(0), BACKGROUND)
+    assert pictures.shape == (3, 3, 32, 32)
+    assert opacity.shape == (3, 32, 32)
+    assert not torch.equal(pictures[0], pictures[1])
+
+
+def test_pictures_depend_on_the_random_stream_alone() -> None:
+    scene = BlockScene(8, SliceConfig(size=32, count=1))
+    state = state_of(scene)
+    one, two, other = (
+        scene.pictures(state, np.random.default_rng(seed), BACKGROUND)[0] for seed in (1, 1, 2)
+    )
+    assert torch.equal(one, two)
+    assert not torch.equal(one, other)
+
+
+@pytest.fixture
+def ball(tmp_path: Path) -> Path:
+    trimesh.creation.icosphere(3, radius=40).export(tmp_path / "ball.glb")
+    return tmp_path / "ball.glb"
+
+
+def test_views_of_a_mesh_show_its_surface_before_the_background(ball: Path) -> None:
+    scene = BlockScene(8, SliceConfig(size=32, count=1, mesh=1.0), mesh=read_mesh(ball))
+    state = state_of(scene).requires_grad_()
+    picture, opacity = scene.pictures(state, np.random.default_rng(0), BACKGROUND)
+    assert set(opacity.unique().tolist()) == {0.0, 1.0}
+    behind = picture[0].permute(1, 2, 0)[opacity[0] == 0]
+    assert (behind == behind[0]).all()
+    picture.sum().backward()
+    assert state.grad is not None
+    assert state.grad[:-1, :3].any()
+
+
+def test_a_pixel_of_a_mesh_shows_a_cell(ball: Path) -> None:
+    for view in mesh_views(read_mesh(ball), 64):
+        # A ball as wide as its box's diagonal allows.
+        radius = 64 / 2 / 3**0.5
+        np.testing.assert_allclose(np.linalg.norm(view.points, axis=1), radius, rtol=0.02)
+        assert view.covered.sum() == len(view.points)
+        assert view.covered.sum() == pytest.approx(np.pi * radius**2, rel=0.03)
+
+
+def test_slices_and_views_are_mixed_as_asked(ball: Path) -> None:
+    random = np.random.default_rng(0)
+    scene = BlockScene(8, SliceConfig(size=32, count=1, mesh=0.5), mesh=read_mesh(ball))
+    state = state_of(scene)
+    whole = [bool((scene.pictures(state, random, BACKGROUND)[1] == 1).all()) for _ in range(40)]
+    assert 10 < sum(whole) < 30
