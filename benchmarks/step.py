@@ -14,12 +14,10 @@ GPU's own events: launching a step is hidden behind the one before, as in a roll
 
 import argparse
 import csv
-import dataclasses
 import json
 import platform
 import time
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from statistics import median
@@ -31,16 +29,13 @@ from torch import Tensor
 from torch.nn import functional
 
 import vnca
-from vdb import smoke
-from vnca.automaton.domain import Domain
+from cases import CHANNELS, PRIORS, Case, Place
 from vnca.errors import VncaError
 from vnca.kernels.update.backend import torch_step
-from vnca.kernels.update.mask import changing_rows
 from vnca.kernels.update.reference import Weights
 from vnca.kernels.update.stencil import FILTERS, stencil
-from vnca.typing import FloatArray, Index, IntArray
+from vnca.typing import FloatArray, Index
 
-CHANNELS, PRIORS, PROBABILITY = 12, 7, 0.5
 BACKENDS = ("plain", "compile", "reference", "native", "triton")
 PASSES = ("forward", "both")
 DTYPES = {"float32": torch.float32, "tf32": torch.float32} | {
@@ -64,71 +59,6 @@ COLUMNS: list[str] = [
     *("backend", "dtype", "pass", "grid", "hidden", "occupancy"),
     *("ns_per_cell_min", "ns_per_cell", "ns_per_cell_max", "gflops", "share_of_peak", "peak_mb"),
 ]
-
-
-@dataclass(frozen=True)
-class Case:
-    """One step, the same for every backend, and a gradient of its result."""
-
-    domain: Domain
-    rows: IntArray
-    state: FloatArray
-    priors: FloatArray
-    weights: tuple[FloatArray, FloatArray, FloatArray]
-    gradient: FloatArray
-
-    @classmethod
-    def draw(cls, grid: Index, hidden: int, occupancy: float) -> "Case":
-        """Random values; with an occupancy under 1 only the cells of a ragged column live."""
-        random = np.random.default_rng(0)
-
-        def normal(*shape: int, scale: float = 1.0) -> FloatArray:
-            return scale * random.standard_normal(shape, dtype=np.float32)
-
-        alive = np.ones(grid, dtype=bool) if occupancy >= 1 else smoke(grid, occupancy)[1]
-        domain = Domain.from_mask(alive, (0, 0, 0))
-        n = len(domain)
-        state = normal(n + 1, CHANNELS)
-        state[-1] = 0
-        inputs = FILTERS * CHANNELS + PRIORS
-        return cls(
-            domain,
-            changing_rows(domain.hashes, seed=0, step=0, probability=PROBABILITY),
-            state,
-            normal(n, PRIORS),
-            (
-                normal(hidden, inputs, scale=0.1),
-                normal(hidden, scale=0.1),
-                normal(CHANNELS, hidden, scale=0.1),
-            ),
-            normal(n + 1, CHANNELS),
-        )
-
-    def rounded(self, dtype: torch.dtype) -> "Case":
-        """With values that a dtype can hold: what is compared is arithmetic, not input."""
-
-        def near(array: FloatArray) -> FloatArray:
-            return torch.from_numpy(array).to(dtype).float().numpy()
-
-        hidden, bias, output = map(near, self.weights)
-        return dataclasses.replace(
-            self,
-            state=near(self.state),
-            priors=near(self.priors),
-            weights=(hidden, bias, output),
-            gradient=near(self.gradient),
-        )
-
-
-class Place(NamedTuple):
-    """Where a backend computes, and with which numbers."""
-
-    device: str
-    dtype: torch.dtype
-
-    def tensor(self, values: FloatArray | Tensor) -> Tensor:
-        """A copy there."""
-        return torch.as_tensor(values).to(self.device, self.dtype, copy=True)
 
 
 class Backend(NamedTuple):
@@ -302,8 +232,8 @@ def needed_flop(hidden: int) -> dict[str, int]:
     return {"forward": forward, "both": forward + backward}
 
 
-def device_name(device: str) -> str:
-    if device != "cpu":
+def device(kind: str = "cpu") -> str:
+    if kind != "cpu":
         return torch.cuda.get_device_name()
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
@@ -416,16 +346,28 @@ def show(dtype: str, peak: float, rows: list[dict[str, Any]]) -> None:
         )
 
 
+def keep(path: Path, run: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    begun = path.exists()
+    with path.open("a", newline="") as file:
+        table = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
+        if not begun:
+            table.writeheader()
+        table.writerows({**run, **row} for row in rows)
+
+
 def main() -> None:
     parser = arguments()
     options = parser.parse_args()
     on_gpu = options.device == "cuda"
+    if on_gpu and not torch.cuda.is_available():
+        parser.error("--device cuda: torch finds no NVIDIA GPU")
     options.backends = options.backends or ["plain", "reference", "triton" if on_gpu else "native"]
     torch.set_num_threads(options.threads)
     case = Case.draw(options.grid, options.hidden, options.occupancy)
     run = {
         "date": datetime.now(timezone.utc).date().isoformat(),
-        "device": device_name(options.device),
+        "device": device(options.device),
         "threads": options.threads,
         "torch": torch.__version__,
         "vnca": vnca.__version__,
@@ -444,18 +386,12 @@ def main() -> None:
         show(dtype, peak, more)
         rows += more
 
-    for path in filter(None, (options.json, options.csv)):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        if options.csv is not None:
+            keep(options.csv, run, more)
     if options.json is not None:
         document = {**run, "gemm_gflops": rows[0]["gemm_gflops"], "rows": rows}
+        options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps(document, indent=2) + "\n")
-    if options.csv is not None:
-        begun = options.csv.exists()
-        with options.csv.open("a", newline="") as file:
-            table = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
-            if not begun:
-                table.writeheader()
-            table.writerows({**run, **row} for row in rows)
 
 
 if __name__ == "__main__":

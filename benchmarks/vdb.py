@@ -11,27 +11,9 @@ import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
+from cases import smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
-from vnca.typing import AnyArray, BoolArray, Box
-
-
-def smoke(shape: tuple[int, int, int], share: float, seed: int = 0) -> tuple[AnyArray, BoolArray]:
-    """A ragged rising column of which `share` of all cells is active."""
-    rng = np.random.default_rng(seed)
-    x, y, z = np.meshgrid(*(np.linspace(-1, 1, n, dtype=np.float32) for n in shape), indexing="ij")
-    field = -(x**2 + z**2) / (0.35 + 0.25 * y) ** 2
-    for octave in range(1, 5):
-        for _ in range(3):
-            direction = rng.normal(size=3) * 2.0**octave * 2
-            phase = rng.uniform(0, 6)
-            field += 0.7**octave * np.sin(
-                direction[0] * x + direction[1] * y + direction[2] * z + phase
-            ).astype(np.float32)
-    threshold = np.quantile(field[::4, ::4, ::4], 1 - share)
-    active = field > threshold
-    return np.where(active, field - threshold, 0).astype(np.float32), active
+from vnca.typing import Box
 
 
 def best_of(runs: int, work: Callable[[], object]) -> float:

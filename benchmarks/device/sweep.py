@@ -1,0 +1,70 @@
+"""Which tile, warps and programs suit a GPU: the constants of `vnca/kernels/update/triton.py`.
+
+Run `python benchmarks/device/sweep.py --csv FILE`. Each is varied alone, from what is there now.
+"""
+
+import argparse
+import csv
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import torch
+from triton.runtime.errors import OutOfResources
+
+sys.path.append(str(Path(__file__).parent.parent))
+
+from cases import Case, Place
+from step import DTYPES, packaged, seconds
+from vnca.kernels.update import triton
+
+CHOICES: dict[str, tuple[Any, ...]] = {
+    "TILE": (32, 64, 128),
+    "PROGRAMS": (2, 3, 4, 6, 8, 16),
+    "WARPS": ((4, 8, 4), (8, 8, 4), (4, 4, 4), (4, 8, 8), (4, 8, 2)),
+    "WEIGHT_BYTES": (
+        (1 << 16, 1 << 15),
+        (1 << 15, 1 << 15),
+        (1 << 16, 1 << 14),
+        (1 << 16, 1 << 16),
+    ),
+}
+
+
+def milliseconds(work: Callable[[], object]) -> float | None:
+    """The best of several times; nothing if it does not fit into a multiprocessor."""
+    try:
+        work()
+    except OutOfResources:
+        return None
+    return round(min(seconds(work, "cuda") for _ in range(3)) * 1e3, 4)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--csv", type=Path, metavar="FILE", required=True)
+    options = parser.parse_args()
+    case = Case.draw((128, 128, 128), 128, 1.0)
+    usual = {name: getattr(triton, name) for name in CHOICES}
+    rows = []
+    for dtype in ("float16", "tf32", "float32"):
+        torch.set_float32_matmul_precision("high" if dtype == "tf32" else "highest")
+        backend = packaged(case, "triton", Place("cuda", DTYPES[dtype]), threads=1)
+        for name, values in CHOICES.items():
+            for value in dict.fromkeys((usual[name], *values)):
+                setattr(triton, name, value)
+                row: dict[str, Any] = {"dtype": dtype, "constant": name, "value": value}
+                row |= {part: milliseconds(getattr(backend, part)) for part in ("forward", "both")}
+                print(row, flush=True)
+                rows.append(row)
+            setattr(triton, name, usual[name])
+    options.csv.parent.mkdir(parents=True, exist_ok=True)
+    with options.csv.open("w", newline="") as file:
+        table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()
