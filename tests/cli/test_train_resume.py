@@ -196,3 +196,36 @@ def test_training_that_keeps_diverging_ends_with_a_line_and_a_model(
     assert "--learning-rate" in complaint
     assert outcome.err.count("at half the learning rate") == 4
     assert vnca("stylize", run, smoke, "--out", tmp_path / "painted", "--warmup", 1).code == 0
+
+
+def test_out_of_memory_while_training_is_one_line_and_loses_nothing(
+    vnca: Vnca, begin: Begin, frame: Path, style: Path, tiny: list[str], tmp_path: Path
+) -> None:
+    whole, run = begin("whole"), tmp_path / "run"
+    roll = Trainer._roll
+
+    def too_much(self: Trainer, *arguments: Any) -> torch.Tensor:
+        return torch.empty(2**50) if self.iteration == 2 else roll(self, *arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Trainer, "_roll", too_much)
+        options = [*tiny, "--iterations", 4, "--preview-every", 3]
+        outcome = vnca("train", frame, style, "--out", run, *options)
+    assert outcome.code == 2
+    assert "Traceback" not in outcome.err
+    *_, complaint = outcome.err.splitlines()
+    assert complaint.startswith("vnca: out of memory in iteration 3: for 1328 cells")
+    assert "--view.size 32 about 7 MB" in complaint
+    assert Model.load(run).training["iterations"] == 2
+    assert vnca("train", "--resume", run).code == 0
+    assert contents(run) == contents(whole)
+
+
+def test_out_of_memory_before_training_is_one_line(
+    vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
+) -> None:
+    options = [*tiny, "--view.size", 300_000]
+    complaint = vnca("train", frame, style, "--out", tmp_path / "run", *options).complaint
+    assert "out of memory" in complaint
+    assert "--view.size 300000" in complaint
+    assert not (tmp_path / "run").exists()

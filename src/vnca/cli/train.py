@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from traceback import clear_frames
 from typing import Annotated, Any, Literal
 
 import torch
@@ -14,13 +15,21 @@ from vnca.cli.options import chosen, parse, say
 from vnca.cli.progress import Progress
 from vnca.cli.recorded import recorded, restored
 from vnca.cli.sequence import beside
-from vnca.errors import DivergenceError, FileFormatError, GridError, OptionError, VncaError
+from vnca.errors import (
+    DivergenceError,
+    FileFormatError,
+    GridError,
+    OptionError,
+    OutOfMemoryError,
+    VncaError,
+)
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image, resize, to_srgb8
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.loop import Trainer
+from vnca.training.memory import is_out_of_memory, memory_advice
 from vnca.training.preview import preview_sheet
 from vnca.training.run import RunFolder
 from vnca.typing import FloatArray
@@ -139,7 +148,16 @@ def _train(options: Train, run_folder: RunFolder, checkpoint: Checkpoint | None 
         )
     torch.use_deterministic_algorithms(True)
     vgg = VGG16.load(options.config.features, device)
-    trainer = Trainer(smoke, style, options.config, vgg, device=device)
+    try:
+        trainer = Trainer(smoke, style, options.config, vgg, device=device)
+    except (MemoryError, RuntimeError) as error:
+        if not is_out_of_memory(error):
+            raise
+        raise OutOfMemoryError(
+            f"out of memory before training began, with the frame and views of "
+            f"--view.size {options.config.view.size} pixels; lower it, or take a frame with less "
+            "smoke"
+        ) from error
     training = {
         "frame": options.frame.name,
         "style": options.style.name,
@@ -222,8 +240,20 @@ class _Session:
             )
             raise
         except DivergenceError:
-            self.show()
+            self.save()
             raise
+        except (MemoryError, RuntimeError) as error:
+            if not is_out_of_memory(error):
+                raise
+            clear_frames(error.__traceback__)  # They hold on to what was computed.
+            trainer.undo()
+            self.keep()
+            self.save()
+            advice = memory_advice(len(trainer.scene.domain), self.options.config)
+            raise OutOfMemoryError(
+                f"out of memory in iteration {trainer.iteration + 1}: {advice}; to go on from here "
+                f"when more is free: vnca train --resume {folder.path}"
+            ) from None
         self.show()
         folder.finish()
         say(f"model: {folder.path}")
@@ -234,9 +264,13 @@ class _Session:
 
     def show(self) -> None:
         """Write the model and a preview."""
+        self.save()
+        self.folder.preview(preview_sheet(self.trainer, self.style), self.trainer.iteration)
+
+    def save(self) -> None:
+        """Write the model."""
         provenance = {**self.training, "iterations": self.trainer.iteration}
         self.folder.save(Model(self.trainer.rule(), provenance, _small(self.style)))
-        self.folder.preview(preview_sheet(self.trainer, self.style), self.trainer.iteration)
 
     def _setback(self) -> str:
         trainer = self.trainer
