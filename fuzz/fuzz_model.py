@@ -73,5 +73,5 @@ def seeds() -> Iterator[bytes]:
 if __name__ == "__main__":
     fuzz(
         "model", suffix=".safetensors", build=build, read=read, limit=limit, seeds=seeds(),
-        longest=2048,
+        longest=2048, between=_BETWEEN,
     )  # fmt: skip

@@ -7,14 +7,19 @@ builds one around them, so that mutation is not stopped by a checksum or an offs
 """
 
 import ctypes
+import json
+import math
 import os
 import re
 import resource
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
+from random import Random
+from typing import Any
 
 import atheris
 
@@ -29,6 +34,10 @@ with atheris.instrument_imports(include=["vnca"]):
 SECONDS = 5
 SLACK = 4 << 20  # bytes that an execution may take whatever the file: the interpreter's own
 _WORK = _ROOT / "build" / "fuzz"
+_ODD_VALUES = (
+    None, True, False, -1, 0, 1, 2, 0.5, 1e308, math.inf, math.nan, 2**31, 2**63, "", "x", [], {},
+    [0], [[]], [-1], {"x": 0},
+)  # fmt: skip
 _PAGE = resource.getpagesize()
 _M_MMAP_THRESHOLD = -3
 
@@ -42,6 +51,7 @@ def fuzz(
     limit: Callable[[int], int],
     seeds: Iterable[bytes],
     longest: int = 4096,
+    between: bytes | None = None,
 ) -> None:
     """Run libFuzzer with the options of the command line until it ends the process.
 
@@ -55,6 +65,7 @@ def fuzz(
         limit: Bytes of memory that the reader declares for a file of so many bytes.
         seeds: Inputs to start from; their files must be readable.
         longest: Bytes of an input.
+        between: What ends JSON at the beginning of an input; it is then also mutated as such.
     """
     shared_memory = Path("/dev/shm")  # nosec B108
     folder = tempfile.TemporaryDirectory(dir=shared_memory if shared_memory.is_dir() else None)
@@ -88,8 +99,38 @@ def fuzz(
     options = [f"-timeout={SECONDS}", f"-max_len={longest}", "-print_final_stats=1"]
     options += ["-rss_limit_mb=4096", f"-artifact_prefix={_WORK}/{name}-"]
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    atheris.Setup([sys.argv[0], *options, *sys.argv[1:], str(corpus)], execute)
+    mutators = {}
+    if between is not None:
+        mutators["custom_mutator"] = partial(_mutated, between)
+    atheris.Setup([sys.argv[0], *options, *sys.argv[1:], str(corpus)], execute, **mutators)
     atheris.Fuzz()
+
+
+def _mutated(between: bytes, data: bytes, longest: int, seed: int) -> bytes:
+    """The input with one value of its JSON exchanged; or mutated as libFuzzer does."""
+    random = Random(seed)
+    begin = data.find(b"{")
+    text, *rest = data[begin:].partition(between)
+    try:
+        if begin < 0 or random.random() < 0.5:
+            raise ValueError
+        document = json.loads(text)
+        parent, key = random.choice(list(_places(document)))
+        parent[key] = random.choice((*_ODD_VALUES, random.choice(list(_places(document)))[0]))
+        changed = b"".join((data[:begin], json.dumps(document).encode(), *rest))
+    except (ValueError, RecursionError, IndexError):
+        return atheris.Mutate(data, longest)
+    return changed if len(changed) <= longest else data
+
+
+def _places(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Where values stand in a JSON document: what holds them, and under which key."""
+    keys = (
+        value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    )
+    for key in keys:
+        yield value, key
+        yield from _places(value[key])
 
 
 def shortened(content: bytes) -> bytes:

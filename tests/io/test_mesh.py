@@ -1,12 +1,17 @@
+import json
+import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from vnca.errors import FileFormatError, GridError, OptionError, VncaError
 from vnca.io.glb import Glb
 from vnca.io.mesh import Mesh, read_mesh
+from vnca.io.mesh_texture import base_colours
 
 BOX = trimesh.creation.box((1, 2, 3))
 
@@ -168,3 +173,56 @@ def test_a_damaged_document_is_told_of(tmp_path: Path) -> None:
         glb.write(tmp_path / "broken.glb")
         with pytest.raises(FileFormatError, match="damaged"):
             read_mesh(tmp_path / "broken.glb")
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        {"buffers": 3},
+        {"buffers": [7]},
+        {"extensionsRequired": 1},
+        {"meshes": [], "nodes": [[1]], "scenes": [{"nodes": [0]}]},
+        {"nodes": [{"scale": [float("nan")] * 3, "mesh": 0}], "scenes": [{"nodes": [0]}]},
+        {
+            "accessors": [{"componentType": 5126, "type": "VEC3", "count": float("inf")}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "nodes": [{"mesh": 0}],
+        },
+    ],
+    ids=range(6),
+)
+def test_json_of_another_kind_than_expected_is_one_clear_line(
+    tmp_path: Path, document: dict[str, Any]
+) -> None:
+    text = json.dumps(document).encode()
+    chunk = struct.pack("<II", len(text), 0x4E4F534A) + text
+    path = tmp_path / "a.glb"
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk)
+    with pytest.raises(FileFormatError, match=r"a\.glb: damaged"):
+        read_mesh(path)
+
+
+def test_parts_that_share_vertices_cannot_multiply_them_without_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    glb = Glb.read(saved(tmp_path / "a.glb"))
+    (mesh,) = glb.items("meshes")
+    mesh["primitives"] *= 10
+    glb.write(tmp_path / "b.glb")
+    assert len(read_mesh(tmp_path / "b.glb").surfaces) == 10
+    monkeypatch.setattr("vnca.io.mesh.MOST_VERTICES", 5 * len(BOX.vertices))
+    with pytest.raises(FileFormatError, match="more than 40 vertices together"):
+        read_mesh(tmp_path / "b.glb")
+
+
+def test_an_obj_file_cannot_bring_pictures_from_elsewhere(tmp_path: Path) -> None:
+    (tmp_path / "inside").mkdir()
+    Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "secret.png")
+    (tmp_path / "inside" / "a.mtl").write_text(f"newmtl m\nmap_Kd {tmp_path}/secret.png\n")
+    (tmp_path / "a.mtl").write_text("newmtl m\nmap_Kd secret.png\n")
+    for library in ("a.mtl", "../a.mtl"):
+        path = obj(
+            tmp_path / "inside" / "a.obj",
+            f"mtllib {library}\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",
+        )
+        assert all(colour.picture.shape == (1, 1, 3) for colour in base_colours(read_mesh(path)))

@@ -21,6 +21,8 @@ _MAGIC, _VERSION = 0x46546C67, 2
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _DTYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+DAMAGE = (KeyError, TypeError, AttributeError, ValueError, IndexError, OverflowError)
+"""What using a document raises whose JSON holds other things than glTF says."""
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
@@ -72,7 +74,10 @@ class Glb:
         if not isinstance(document, dict):
             raise FileFormatError(f"{path}: damaged, its JSON is not a document")
         glb = cls(path, document, chunks.get(_BIN, b""))
-        glb._check()
+        try:
+            glb._check()
+        except DAMAGE as error:
+            raise FileFormatError(f"{path}: damaged, its JSON is no glTF document") from error
         return glb
 
     def to_bytes(self) -> bytes:
@@ -130,7 +135,7 @@ class Glb:
                 raise ValueError("too many values")
             if sparse := entry.get("sparse"):
                 self._scatter(values, sparse)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except DAMAGE as error:
             raise FileFormatError(
                 f"{self.path}: damaged, accessor {accessor} cannot be read ({error})"
             ) from error

@@ -23,10 +23,10 @@ _ENCODERS: dict[str, tuple[str, dict[str, Any]]] = {
     ".jpeg": ("JPEG", {"quality": 92, "subsampling": 0}),
     ".webp": ("WEBP", {"quality": 92, "method": 4}),
 }
-# Pillow knows many more; some are decoded by other programs (EPS) or hardly tested.
-_READ = ("PNG", "JPEG", "WEBP", "TIFF", "GIF", "BMP", "PPM", "JPEG2000")
 SUFFIXES = (*_ENCODERS, ".exr")
 """What `write_image` writes."""
+FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "GIF", "BMP", "PPM", "JPEG2000")
+"""What is read. Pillow knows more, some of it decoded by other programs (EPS) or hardly tested."""
 _LARGEST_HALF = 65504.0
 
 
@@ -50,7 +50,7 @@ def read_image(path: Path) -> FloatArray:
             warnings.filterwarnings("ignore", category=UserWarning, module="PIL")
             # From memory: Pillow asks a file for as many bytes as a chunk says it has, and Python
             # makes room for them all before it reads.
-            with Image.open(BytesIO(path.read_bytes()), formats=_READ) as image:
+            with Image.open(BytesIO(path.read_bytes()), formats=FORMATS) as image:
                 return _linear_rgb(ImageOps.exif_transpose(image))
     except Image.UnidentifiedImageError as error:
         raise FileFormatError(

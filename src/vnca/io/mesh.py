@@ -13,13 +13,15 @@ import numpy as np
 
 from vnca.errors import BackendUnavailableError, FileFormatError, GridError, OptionError
 from vnca.files import existing_file
-from vnca.io.glb import Glb
+from vnca.io.glb import DAMAGE, Glb
 from vnca.io.orientation import UpAxis
 from vnca.typing import AnyArray
 
 SUFFIXES = (".glb", ".obj", ".ply", ".stl")
 """What `read_mesh` reads."""
 _UP: dict[str, UpAxis] = {".glb": "y", ".obj": "y", ".ply": "z", ".stl": "z"}
+MOST_VERTICES = 2**25
+"""Vertices of all surfaces together, which may share those of the file."""
 TRIANGLES = 4
 _STRIP, _FAN = 5, 6
 # glTF has +y up: its (x, y, z) is our (x, −z, y), and a file with +z up is turned to lie so.
@@ -96,8 +98,9 @@ def read_mesh(path: Path, up: UpAxis | None = None) -> Mesh:
     else:
         glb = _converted(path, up)
     try:
-        surfaces = list(_surfaces(glb))
-    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
+        with np.errstate(over="ignore", invalid="ignore"):  # refused below
+            surfaces = list(_surfaces(glb))
+    except DAMAGE as error:
         raise FileFormatError(f"{path}: damaged, its meshes cannot be read ({error})") from error
     if not surfaces:
         raise GridError(f"{path}: there are no triangles in it to texture")
@@ -162,6 +165,7 @@ def _converted(path: Path, up: UpAxis) -> Glb:
 
 
 def _surfaces(glb: Glb) -> Iterator[Surface]:
+    vertices = 0
     for mesh, matrix in _placed_meshes(glb):
         entry = glb.item("meshes", mesh)
         for primitive in entry["primitives"]:
@@ -169,6 +173,9 @@ def _surfaces(glb: Glb) -> Iterator[Surface]:
             if mode not in (TRIANGLES, _STRIP, _FAN) or "POSITION" not in primitive["attributes"]:
                 continue
             points = glb.array(primitive["attributes"]["POSITION"])
+            vertices += len(points)
+            if vertices > MOST_VERTICES:
+                raise ValueError(f"its parts have more than {MOST_VERTICES} vertices together")
             faces = _faces(glb, primitive, mode, len(points))
             if not len(faces):
                 continue

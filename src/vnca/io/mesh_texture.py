@@ -12,7 +12,8 @@ from PIL import Image
 from vnca.colour import srgb_to_linear
 from vnca.errors import FileFormatError
 from vnca.files import whole_file
-from vnca.io.glb import Glb
+from vnca.io.glb import DAMAGE, Glb
+from vnca.io.image import FORMATS
 from vnca.io.mesh import TO_OURS, TRIANGLES, Mesh, Surface, trimesh_for
 from vnca.typing import AnyArray, FloatArray
 
@@ -101,7 +102,7 @@ def base_colours(mesh: Mesh) -> list[BaseColour]:
     pictures: dict[int, FloatArray] = {}
     try:
         return [_base_colour(mesh.glb, surface, pictures) for surface in mesh.surfaces]
-    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
+    except DAMAGE as error:
         raise FileFormatError(
             f"{mesh.glb.path}: damaged, its materials cannot be read ({error})"
         ) from error
@@ -193,7 +194,7 @@ def _base_colour(glb: Glb, surface: Surface, pictures: dict[int, FloatArray]) ->
 
 def _decoded(glb: Glb, data: bytes) -> FloatArray:
     try:
-        with Image.open(io.BytesIO(data)) as image:
+        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             pixels = np.asarray(image.convert("RGB"))
     except Exception as error:  # Decoders raise whatever a damaged file makes them trip over.
         raise FileFormatError(f"{glb.path}: a picture in it is damaged ({error})") from error
