@@ -33,7 +33,7 @@ test-faults: setup
 
 # Coverage-guided; the seconds are shared by all targets. Findings are left in build/fuzz.
 FUZZ_SECONDS ?= 600
-FUZZED := vdb npz model image
+FUZZED := vdb npz model image mesh
 fuzz: setup
 	for reader in $(FUZZED); do \
 	  $(BIN)/python fuzz/fuzz_$$reader.py -verbosity=0 \
