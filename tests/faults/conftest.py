@@ -1,16 +1,19 @@
-"""The command line as a program of its own that can be killed at any moment."""
+"""The command line as a program of its own that can be killed, and a disk that can be filled."""
 
 import json
 import random
+import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from signal import SIGKILL
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from vnca.automaton.model import Model
 from vnca.automaton.rule import Rule, RuleConfig, Scales
@@ -79,3 +82,60 @@ def stylizing(tmp_path_factory: pytest.TempPathFactory) -> list[object]:
     Model(replace(rule, output=output)).save(folder / "rule.safetensors")
     quick = ("--warmup", 16, "--steps-per-frame", 8)
     return ["stylize", folder / "rule.safetensors", folder / "smoke", *quick]
+
+
+@pytest.fixture(scope="session")
+def training(tiny_smoke: Volume, tmp_path_factory: pytest.TempPathFactory) -> list[object]:
+    """A little smoke and a picture: the arguments of a short training without its output."""
+    folder = tmp_path_factory.mktemp("inputs")
+    write_smoke(folder / "ball_0001.vdb", tiny_smoke)
+    with Image.open(str(files("vnca.data") / "vangogh_cafe_terrace.webp")) as image:
+        image.convert("RGB").resize((40, 50)).save(folder / "style.png")
+    quick = (
+        *("--iterations", 12, "--preview-every", 5, "--hidden", 8, "--channels", 6),
+        *("--appearance.layers", "relu1_1", "relu2_1", "--appearance.samples", 64),
+        *("--view.size", 32, "--shortest-rollout", 2, "--longest-rollout", 5),
+        *("--pool.size", 4, "--device", "cpu"),
+    )
+    return ["train", folder / "ball_0001.vdb", folder / "style.png", *quick]
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of its own, of two megabytes."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    if not mounted("-t", "tmpfs", "-o", "size=2m", "tmpfs", place):
+        pytest.skip("no right to mount a small disk")
+    yield place
+    subprocess.run(["umount", "--lazy", place], check=True)
+
+
+@pytest.fixture
+def remount(disk: Path) -> Callable[[str], None]:
+    """Makes the disk read-only, `ro`, or writable again, `rw`."""
+
+    def change(how: str) -> None:
+        assert mounted("-o", f"remount,{how}", disk)
+
+    return change
+
+
+@pytest.fixture
+def fill(disk: Path) -> Callable[[int], Path]:
+    """Leaves so many bytes on the disk; gives the file that takes the others."""
+
+    def leave(free: int) -> Path:
+        filler = disk / "filler"
+        filler.write_bytes(bytes(shutil.disk_usage(disk).free - free))
+        return filler
+
+    return leave
+
+
+def mounted(*arguments: object) -> bool:
+    try:
+        done = subprocess.run(["mount", *map(str, arguments)], capture_output=True)
+    except FileNotFoundError:
+        return False
+    return done.returncode == 0

@@ -1,8 +1,6 @@
 """Disks that are full, read-only or limited while a sequence is painted."""
 
 import resource
-import shutil
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,25 +17,6 @@ pytestmark = [
     pytest.mark.faults,
     pytest.mark.skipif(sys.platform != "linux", reason="mounts and limits as Linux has them"),
 ]
-
-
-@pytest.fixture
-def disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of its own, of two megabytes."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    if not mounted("-t", "tmpfs", "-o", "size=2m", "tmpfs", place):
-        pytest.skip("no right to mount a small disk")
-    yield place
-    subprocess.run(["umount", "--lazy", place], check=True)
-
-
-def mounted(*arguments: object) -> bool:
-    try:
-        done = subprocess.run(["mount", *map(str, arguments)], capture_output=True)
-    except FileNotFoundError:
-        return False
-    return done.returncode == 0
 
 
 @pytest.fixture
@@ -82,20 +61,12 @@ def require_whole(folder: Path, *, fewer_than: int) -> None:
     assert others <= {f".{frames[0].stem}.resume.safetensors"}
 
 
-def fill(disk: Path, *, but: int) -> Path:
-    """Leave so many bytes on a disk."""
-    filler = disk / "filler"
-    free = shutil.disk_usage(disk).free
-    filler.write_bytes(bytes(free - but))
-    return filler
-
-
 def test_a_full_disk_keeps_the_frames_before_and_goes_on_when_there_is_room(
-    stylize: Stylize, expected: dict[str, bytes], disk: Path
+    stylize: Stylize, expected: dict[str, bytes], disk: Path, fill: Callable[[int], Path]
 ) -> None:
     out = disk / "out"
     sizes = [len(data) for data in expected.values()]
-    filler = fill(disk, but=sum(sizes[:3]) + 400_000)
+    filler = fill(sum(sizes[:3]) + 400_000)
     code, complaint = stylize("--out", out)
     assert code == 2
     assert f"{out}/" in complaint
@@ -108,11 +79,16 @@ def test_a_full_disk_keeps_the_frames_before_and_goes_on_when_there_is_room(
 
 @pytest.mark.parametrize("name", ["film.mp4", "film.gif"])
 def test_a_full_disk_for_the_film_leaves_none_until_there_is_room(
-    stylize: Stylize, expected: dict[str, bytes], disk: Path, tmp_path: Path, name: str
+    stylize: Stylize,
+    expected: dict[str, bytes],
+    disk: Path,
+    fill: Callable[[int], Path],
+    tmp_path: Path,
+    name: str,
 ) -> None:
     out, film = tmp_path / "out", disk / name
     options = ("--out", out, "--preview", film, "--film.rows", 96, "--film.columns", 96)
-    filler = fill(disk, but=4096)
+    filler = fill(4096)
     code, complaint = stylize(*options)
     assert code == 2
     assert "No space left on device" in complaint
@@ -124,10 +100,13 @@ def test_a_full_disk_for_the_film_leaves_none_until_there_is_room(
 
 
 def test_a_read_only_disk_is_refused_before_work(
-    stylize: Stylize, disk: Path, monkeypatch: pytest.MonkeyPatch
+    stylize: Stylize,
+    disk: Path,
+    remount: Callable[[str], None],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(Roll, "paint", lambda *_: pytest.fail("painted"))
-    assert mounted("-o", "remount,ro", disk)
+    remount("ro")
     for options in (("--out", disk / "out"), ("--out", "out", "--preview", disk / "film.gif")):
         code, complaint = stylize(*options)
         assert code == 2
@@ -138,6 +117,7 @@ def test_a_disk_that_becomes_read_only_keeps_the_frames_before(
     stylize: Stylize,
     expected: dict[str, bytes],
     disk: Path,
+    remount: Callable[[str], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As the system makes a disk that fails."""
@@ -147,7 +127,7 @@ def test_a_disk_that_becomes_read_only_keeps_the_frames_before(
         nonlocal painted
         painted += 1
         if painted == 4:
-            assert mounted("-o", "remount,ro", disk)
+            remount("ro")
         return paint(self, smoke, state)
 
     monkeypatch.setattr(Roll, "paint", eventful)
@@ -156,7 +136,7 @@ def test_a_disk_that_becomes_read_only_keeps_the_frames_before(
     assert code == 2
     assert "cannot be written (Read-only file system)" in complaint
     require_whole(out, fewer_than=len(expected))
-    assert mounted("-o", "remount,rw", disk)
+    remount("rw")
     assert stylize("--out", out, "--resume") == (0, "")
     assert contents(out) == expected
 

@@ -5,7 +5,6 @@ import random
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -14,30 +13,12 @@ from PIL import Image
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from vnca.automaton.model import MODEL_NAME, Model
-from vnca.io.smoke import write_smoke
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
-from vnca.volume import Volume
 
 pytestmark = [
     pytest.mark.faults,
     pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL"),
 ]
-QUICK = (
-    *("--iterations", "12", "--preview-every", "5", "--hidden", "8", "--channels", "6"),
-    *("--view.size", "32", "--appearance.samples", "64"),
-    *("--appearance.layers", "relu1_1", "relu2_1", "--pool.size", "4", "--device", "cpu"),
-    *("--shortest-rollout", "2", "--longest-rollout", "5"),
-)
-
-
-@pytest.fixture(scope="module")
-def inputs(tiny_smoke: Volume, tmp_path_factory: pytest.TempPathFactory) -> list[object]:
-    """The arguments of a short training without its output."""
-    folder = tmp_path_factory.mktemp("inputs")
-    write_smoke(folder / "ball_0001.vdb", tiny_smoke)
-    with Image.open(str(files("vnca.data") / "vangogh_cafe_terrace.webp")) as image:
-        image.convert("RGB").resize((40, 50)).save(folder / "style.png")
-    return ["train", folder / "ball_0001.vdb", folder / "style.png", *QUICK]
 
 
 @pytest.fixture(scope="module")
@@ -92,17 +73,17 @@ def require_whole(folder: Path) -> None:
             assert path.name.startswith("events.")
 
 
-def survive(program: Any, inputs: list[object], folder: Path, *, kills: int, seed: int) -> None:
+def survive(program: Any, training: list[object], folder: Path, *, kills: int, seed: int) -> None:
     """Kill one training after the other, some several times, and compare how they end."""
     draw = random.Random(seed)
-    moments = program.finish([*inputs, "--out", folder / "unharmed"])
+    moments = program.finish([*training, "--out", folder / "unharmed"])
     expected, shown = contents(folder / "unharmed"), curves(folder / "unharmed")
     assert {MODEL_NAME, "config.json", "preview_000012.png"} < expected.keys()
     assert CHECKPOINT_NAME not in expected
-    killed = trainings = 0
+    killed = runs = 0
     while killed < kills:
-        out = folder / f"{trainings}"
-        arguments = [*inputs, "--out", out]
+        out = folder / f"{runs}"
+        arguments = [*training, "--out", out]
         for _ in range(draw.randint(1, 3)):
             if killed < kills and program.kill(arguments, moments, draw):
                 killed += 1
@@ -110,23 +91,23 @@ def survive(program: Any, inputs: list[object], folder: Path, *, kills: int, see
             if (out / CHECKPOINT_NAME).exists() or (out / MODEL_NAME).exists():
                 arguments = ["train", "--resume", out]
         program.finish(arguments)
-        assert contents(out) == expected, f"training {trainings}, seed {seed}"
+        assert contents(out) == expected, f"training {runs}, seed {seed}"
         assert curves(out) == shown
-        trainings += 1
-    print(f"{killed} kills of {trainings} trainings, all ended with the same {len(expected)} files")
+        runs += 1
+    print(f"{killed} kills of {runs} trainings, all ended with the same {len(expected)} files")
 
 
-def test_three_kills(warm: Any, inputs: list[object], tmp_path: Path) -> None:
-    survive(warm, inputs, tmp_path, kills=3, seed=1)
+def test_three_kills(warm: Any, training: list[object], tmp_path: Path) -> None:
+    survive(warm, training, tmp_path, kills=3, seed=1)
 
 
 @pytest.mark.slow
-def test_forty_five_kills(warm: Any, inputs: list[object], tmp_path: Path) -> None:
-    survive(warm, inputs, tmp_path, kills=45, seed=2)
+def test_forty_five_kills(warm: Any, training: list[object], tmp_path: Path) -> None:
+    survive(warm, training, tmp_path, kills=45, seed=2)
 
 
 @pytest.mark.slow
 def test_five_kills_of_a_program_that_starts_anew(
-    program: Any, inputs: list[object], tmp_path: Path
+    program: Any, training: list[object], tmp_path: Path
 ) -> None:
-    survive(program, inputs, tmp_path, kills=5, seed=3)
+    survive(program, training, tmp_path, kills=5, seed=3)
