@@ -124,7 +124,7 @@ def with_fitted_scale(format: SmokeFormat, frames: Sequence[Frame]) -> SmokeForm
         try:
             volumes = [read_smoke(path, unscaled, frame=number) for number, path in pairs[chosen]]
             scales.append(fit_velocity_scale(*volumes))
-        except (GridError, FileFormatError) as error:
+        except (GridError, FileFormatError) as error:  # noqa: PERF203
             failure = error
     if failure is not None and not scales:
         raise failure
