@@ -79,8 +79,8 @@ def read(path: Path) -> None:
 
 
 def limit(size: int) -> int:
-    """What reading a grid may take: see `docs/reliability.md`."""
-    return 128 * size
+    """A leaf or tile of equal values is packed into some hundredth of what it is in memory."""
+    return 64 * size
 
 
 def seeds() -> Iterator[bytes]:
