@@ -1,6 +1,7 @@
 import json
 import math
 import struct
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from safetensors.numpy import load_file, save_file
 
 from vnca.automaton.model import MODEL_NAME, Model, from_record
 from vnca.automaton.rule import Rule, RuleConfig, Scales
-from vnca.errors import FileFormatError, ModelError, OptionError, ShapeError
+from vnca.errors import FileFormatError, ModelError, OptionError, OutputError, ShapeError
 from vnca.io.smoke_format import SmokeFormat
 from vnca.typing import AnyArray
 
@@ -24,6 +25,24 @@ def model() -> Model:
     rule = Rule.initial(config, Scales(density=2, velocity=3, gamma=0.25), seed=1)
     style = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
     return Model(rule, {"style": "a.png", "iterations": 12}, style)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits")
+def test_a_full_disk_is_told_and_leaves_the_earlier_model(model: Model, tmp_path: Path) -> None:
+    import resource
+
+    path = tmp_path / MODEL_NAME
+    model.save(path)
+    before = path.read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        with pytest.raises(OutputError, match=r"model\.safetensors: cannot be written"):
+            model.save(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_model_comes_back_as_it_was_saved(model: Model, tmp_path: Path) -> None:

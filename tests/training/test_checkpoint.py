@@ -230,6 +230,7 @@ def test_checkpoints_take_their_share_of_the_time(monkeypatch: pytest.MonkeyPatc
     now = 1000.0
     monkeypatch.setattr("time.monotonic", lambda: now)
     thrift = Thrift()
+    assert not thrift.is_due
     spent, start = 0.0, now
     for cost in (0.1, 2.0, 0.5, 3.0):
         while not thrift.is_due:

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
+from safetensors.numpy import save
 
 import vnca
 from vnca.automaton.rule import Rule, RuleConfig, Scales
@@ -70,7 +70,8 @@ class Model:
             )
         }
         with whole_file(path) as temporary:
-            save_file(tensors, temporary, metadata=metadata)
+            # Not by safetensors itself, which has an error of its own for a full disk.
+            temporary.write_bytes(save(tensors, metadata=metadata))
 
     @classmethod
     def load(cls, path: Path) -> "Model":

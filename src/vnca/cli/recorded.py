@@ -48,6 +48,6 @@ def _restored(hint: Any, value: Any, name: str) -> Any:
         return restored(hint, value)
     elif hint is Path and isinstance(value, str):
         return Path(value)
-    elif type(value) is hint or (hint is float and type(value) is int):
+    elif type(value) is hint or (hint is float and type(value) is int and abs(value) < 2**53):
         return value
     raise TypeError(f"{name}: {value!r} is not of its type")

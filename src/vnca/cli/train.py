@@ -175,7 +175,8 @@ def _train(options: Train, run_folder: RunFolder, checkpoint: Checkpoint | None 
     asked = _asked(dataclasses.replace(options, smoke=smoke_format))
     with run_folder as folder:
         session = _Session(trainer, options, folder, style, training, inputs, asked)
-        session.keep()
+        if checkpoint is None:
+            session.keep()
         folder.start(options.config, training)
         say(
             f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "

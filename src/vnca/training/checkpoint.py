@@ -174,8 +174,8 @@ class Thrift:
     """Time between them even where they cost nothing."""
 
     def __init__(self) -> None:
-        """Begin with one that is due."""
-        self._due = 0.0
+        """Begin as if one had just been written at no cost."""
+        self._due = time.monotonic() + self.least_seconds
 
     @property
     def is_due(self) -> bool:
