@@ -2,12 +2,15 @@
 
 import importlib
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from vnca.errors import BackendUnavailableError
 from vnca.typing import FloatArray
+
+if TYPE_CHECKING:
+    from vnca.features.flow import FlowNetwork
 
 Estimator: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
 """Grey pictures `[row, column]` before and after, as displayed (sRGB, 0–1), to pixels moved,
@@ -20,11 +23,16 @@ def ours(device: str = "cpu") -> Estimator:
     Raises:
         FileFormatError: If its weights are missing or damaged.
     """
-    import torch
-
     from vnca.features.flow import FlowNetwork
 
-    network = FlowNetwork.load(device)
+    return estimator_of(FlowNetwork.load(device))
+
+
+def estimator_of(network: "FlowNetwork") -> Estimator:
+    """A flow network called like the others."""
+    import torch
+
+    device = next(network.parameters()).device
 
     def estimate(before: FloatArray, after: FloatArray) -> FloatArray:
         pair = torch.from_numpy(np.stack([before, after])[:, None]).float().to(device)
