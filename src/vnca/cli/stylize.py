@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 import vnca
-from vnca.automaton.model import Model
+from vnca.automaton.model import Model, from_record
 from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
 from vnca.cli.film import Film, FilmConfig
@@ -99,7 +99,7 @@ def run(arguments: Sequence[str]) -> None:
 
 def _recorded(model: Path, smoke: Any) -> SmokeFormat:
     try:
-        return SmokeFormat(**smoke)
+        return from_record(SmokeFormat, smoke)
     except TypeError as error:
         raise ModelError(f"{model}: damaged model metadata (smoke: {error})") from error
 
