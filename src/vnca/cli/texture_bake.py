@@ -23,7 +23,7 @@ from vnca.texturing.block import sample_block
 
 SUFFIXES = (".glb", ".ply")
 MANY_FACES = 200_000
-"""From here on unwrapping takes minutes."""
+"""From here on the user is told that unwrapping takes long."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def bake_mesh(options: Bake) -> None:
 def _bake(options: Bake, rule: Rule, mesh: Mesh, place: Placement) -> None:
     # Unwrapping can fail; growing, which takes longest, cannot.
     if mesh.face_count > MANY_FACES:
-        say(f"{options.mesh}: {mesh.face_count} faces; without UVs, unwrapping takes minutes")
+        say(f"{options.mesh}: {mesh.face_count} faces; without UVs, unwrapping takes long")
     unwrappings, texels = unwrapped(mesh, options.unwrap, size=options.size)
     kept = all(unwrapping.source is None for unwrapping in unwrappings)
     say(
