@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 from vnca.automaton.model import MODEL_NAME, Model
+from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.loop import Progress, Trainer
 
@@ -169,34 +170,36 @@ def test_interrupted_training_leaves_a_usable_model(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_control_c_ends_the_program_with_a_model(
-    frame: Path, style: Path, tiny: list[str], tmp_path: Path
+@pytest.mark.parametrize(("how", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_the_program_with_a_model(
+    frame: Path, style: Path, tiny: list[str], tmp_path: Path, how: signal.Signals, code: int
 ) -> None:
     run = tmp_path / "run"
     arguments = ["train", str(frame), str(style), "--out", str(run), *tiny]
     # Far more iterations than there is time for, the first model after one.
     arguments += ["--iterations", "1000000", "--preview-every", "1"]
     # Children of a shell's background job are born deaf to Control-C.
-    code = (
+    main = (
         "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
         "from vnca.cli import main; sys.exit(main(sys.argv[1:]))"
     )
-    command = [sys.executable, "-c", code, *arguments]
+    command = [sys.executable, "-c", main, *arguments]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as program:
         try:
             end = time.monotonic() + 120
             while not (run / MODEL_NAME).exists() and time.monotonic() < end:
                 assert program.poll() is None, program.stderr and program.stderr.read()
                 time.sleep(0.05)
-            os.kill(program.pid, signal.SIGINT)
+            os.kill(program.pid, how)
             _, err = program.communicate(timeout=60)
         finally:
             program.kill()
-    assert program.returncode == 130
+    assert program.returncode == code
     assert "Traceback" not in err
     assert "stopped at iteration" in err
     assert Model.load(run).training["iterations"] >= 1
     assert not [path for path in run.iterdir() if path.name.startswith(".")]
+    assert Checkpoint.load(run / CHECKPOINT_NAME).training["trainer"].values["iteration"] >= 1
 
 
 def test_smoke_in_mantaflows_npz_files_can_be_trained_on(

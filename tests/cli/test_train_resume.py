@@ -195,6 +195,7 @@ def test_training_that_keeps_diverging_ends_with_a_line_and_a_model(
     assert complaint.startswith("vnca: training has diverged 4 times")
     assert "--learning-rate" in complaint
     assert outcome.err.count("at half the learning rate") == 4
+    assert not (run / CHECKPOINT_NAME).exists()
     assert vnca("stylize", run, smoke, "--out", tmp_path / "painted", "--warmup", 1).code == 0
 
 

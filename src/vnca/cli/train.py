@@ -240,8 +240,9 @@ class _Session:
                 f"to go on: vnca train --resume {folder.path}"
             )
             raise
-        except DivergenceError:
+        except DivergenceError:  # which would come again
             self.save()
+            folder.finish()
             raise
         except (MemoryError, RuntimeError) as error:
             if not is_out_of_memory(error):
