@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo test test-slow test-faults fuzz audit check format lock bench clean
+.PHONY: setup demo test test-slow test-faults fuzz audit check format lock bench bench-flow clean
 
 setup: $(READY)
 
@@ -64,6 +64,10 @@ lock:
 bench: setup
 	$(BIN)/python benchmarks/vdb.py
 	$(BIN)/python benchmarks/step.py
+
+# MSOE=FILE also compares with the published weights, which are not part of the project.
+bench-flow: setup
+	$(BIN)/python benchmarks/flow.py $(if $(MSOE),--reference $(MSOE))
 
 clean:
 	rm -rf $(VENV)

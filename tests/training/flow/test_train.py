@@ -4,6 +4,7 @@ import pytest
 import torch
 from torch import Generator, Tensor
 
+from vnca.errors import BackendUnavailableError, OutputError
 from vnca.features.flow import FlowNetwork
 from vnca.training.flow import train as loop
 from vnca.training.flow.pairs import Pairs, random_pairs
@@ -61,3 +62,11 @@ def test_progress_is_told(tmp_path: Path) -> None:
     assert len(told) == 2
     assert "2 of 3" in told[0]
     assert "endpoint error" in told[0]
+
+
+def test_what_would_come_too_late_is_said_before_training(tmp_path: Path, monkeypatch) -> None:
+    with pytest.raises(OutputError, match="name a file"):
+        train(FlowTraining(tmp_path))
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(BackendUnavailableError, match="use --device cpu"):
+        train(FlowTraining(tmp_path / "flow.safetensors", device="cuda"))

@@ -4,12 +4,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import torch
 from jaxtyping import Float
 from torch import Generator, Tensor
 
+from vnca.errors import BackendUnavailableError
 from vnca.features.flow import FlowNetwork
+from vnca.files import writable_file
 from vnca.training.flow.pairs import Pairs, random_pairs
 from vnca.training.flow.textures import KINDS, bank
 
@@ -36,7 +39,7 @@ class FlowTraining:
         seed: Of everything random.
         iterations: Steps of the optimiser.
         pixels: In each of the two pictures of a step, over all its pairs; 16 pairs of 96².
-        device: `cpu` or `cuda`.
+        device: What computes.
         every: Iterations between reports and unfinished weights.
     """
 
@@ -44,7 +47,7 @@ class FlowTraining:
     seed: int = 0
     iterations: int = 6000
     pixels: int = 147456
-    device: str = "cpu"
+    device: Literal["cpu", "cuda"] = "cpu"
     every: int = 200
 
 
@@ -52,9 +55,12 @@ def train(options: FlowTraining, report: Callable[[str], None] = print) -> FlowN
     """Train a network and write it, also every so often while it is not finished.
 
     Raises:
-        BackendUnavailableError: If scikit-image is not installed.
+        BackendUnavailableError: If scikit-image is not installed, or there is no GPU to train on.
         OutputError: If the weights cannot be written.
     """
+    writable_file(options.out)
+    if options.device == "cuda" and not torch.cuda.is_available():
+        raise BackendUnavailableError("--device cuda: no usable GPU was found; use --device cpu")
     device = torch.device(options.device)
     torch.manual_seed(options.seed)
     random = Generator(device).manual_seed(options.seed)
