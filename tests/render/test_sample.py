@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.render.sample import sample
+from vnca.render.sample import _by_corners, sample
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -30,3 +30,14 @@ def test_sampling_gradient_matches_finite_differences() -> None:
     field = torch.rand(2, 3, 2, 2, dtype=torch.float64, generator=generator, requires_grad=True)
     points = torch.rand(9, 3, dtype=torch.float64, generator=generator) * 4 - 1
     assert torch.autograd.gradcheck(lambda f: sample(f, points), (field,))
+
+
+def test_on_a_gpu_sampling_is_the_same_but_for_rounding() -> None:
+    generator = torch.Generator().manual_seed(1)
+    field = torch.rand(4, 5, 3, 2, dtype=torch.float64, generator=generator, requires_grad=True)
+    points = torch.rand(300, 3, dtype=torch.float64, generator=generator) * 8 - 2
+    weights = torch.rand(300, 2, dtype=torch.float64, generator=generator)
+    expected, found = sample(field, points), _by_corners(field, points)
+    torch.testing.assert_close(found, expected)
+    gradients = [torch.autograd.grad((v * weights).sum(), field)[0] for v in (expected, found)]
+    torch.testing.assert_close(gradients[1], gradients[0])

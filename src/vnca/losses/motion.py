@@ -16,7 +16,7 @@ _SMALLEST_SQUARE = 1e-12
 class MotionConfig:
     """What the seen motion is compared with, and how strongly."""
 
-    weight: float = 0.0
+    weight: float = 1.0
     """Weight of motion relative to the median appearance loss, λ; 0 leaves it out."""
     direction: float = 1.0
     """Weight of the direction, λ_dir."""

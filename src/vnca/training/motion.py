@@ -10,8 +10,8 @@ import math
 import statistics
 from collections import deque
 
+import torch
 from torch import Tensor
-from torch.nn import functional
 
 from vnca.features.flow import FlowNetwork
 from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss, supervised
@@ -53,11 +53,7 @@ class MotionSupervision:
             opacity: Opacity of the same view `[s, s]`.
             frames: Frames that pass in the rollout, n / N.
         """
-        size = target.shape[0]
-        grey = (
-            functional.interpolate(luminance(picture)[:, :1], (size, size), mode="area")[:, 0]
-            for picture in (before, after)
-        )
+        grey = (_shrunk(luminance(picture)[:, 0], target.shape[0]) for picture in (before, after))
         seen = self._network(*grey)[0].permute(1, 2, 0) / frames
         return compare_motion(seen, target, supervised(target, opacity, self.config))
 
@@ -82,3 +78,20 @@ class MotionSupervision:
         if not all(map(math.isfinite, losses)):
             raise ValueError("appearance: not all finite")
         self.appearance = deque(losses, maxlen=self.config.balance_over)
+
+
+def _shrunk(pictures: Tensor, size: int) -> Tensor:
+    """Pictures `[b, r, c]` as `[b, size, size]`, each pixel the mean of the area it covers.
+
+    As a product of matrices, whose gradient is the same in every run on a GPU too.
+    """
+    rows, columns = (_averages(n, size).to(pictures) for n in pictures.shape[1:])
+    return rows @ pictures @ columns.T
+
+
+def _averages(many: int, few: int) -> Tensor:
+    """The matrix `[few, many]` that averages a row of pixels into a shorter one."""
+    edges = torch.arange(few + 1) * (many / few)
+    pixel = torch.arange(many)
+    covered = (edges[1:, None] - pixel).clamp(0, 1) - (edges[:-1, None] - pixel).clamp(0, 1)
+    return covered * (few / many)
