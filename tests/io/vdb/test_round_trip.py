@@ -58,6 +58,7 @@ def values_of(kind: ValueType, count: int, half: bool, random: np.random.Generat
     special = np.array([0, -0.0, np.inf, -np.inf, np.nan, 1e-7], np.float16)
     halves = random.integers(0, 2**16, shape, np.uint16).view(np.float16)
     values = np.where(random.random(shape) < 0.2, random.choice(special, shape), halves)
+    values[np.isnan(values)] = np.nan  # conversion may change which one it is
     if half or kind.name == "half":
         return values.astype(kind.dtype)
     with np.errstate(all="ignore"):
@@ -126,7 +127,7 @@ def cells(tree: Tree) -> dict[tuple[int, ...], tuple[AnyArray, AnyArray]]:
     for origin, edge, values, active in zip(
         tree.tiles.origins.tolist(), tree.tiles.edges.tolist(), *tree.tiles[2:], strict=True
     ):
-        if active or (values != tree.background).any():
+        if active or not np.array_equal(values, tree.background, equal_nan=True):
             found[(*origin, edge)] = values[None], np.array([active])
     return found
 

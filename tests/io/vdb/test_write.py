@@ -72,6 +72,21 @@ def test_values_come_back_bit_for_bit(
     assert got.active_voxels == grid.active_voxels
 
 
+@pytest.mark.parametrize("value_type", ["float", "vec3d"])
+def test_a_background_that_is_no_number_is_omitted_as_any_other(
+    value_type: str, random_grid: Builder, tmp_path: Path
+) -> None:
+    sizes = []
+    for background in (0, np.nan):
+        write_vdb(tmp_path / "a.vdb", [random_grid(value_type, background=background)])
+        sizes.append((tmp_path / "a.vdb").stat().st_size)
+        with open_vdb(tmp_path / "a.vdb") as file:
+            tree = file.read(value_type).tree
+        assert len(tree.tiles.origins) == 0
+        np.testing.assert_array_equal(np.unique(tree.leaf_values[~tree.leaf_active]), background)
+    assert sizes[0] == sizes[1]
+
+
 def test_only_files_with_a_half_grid_are_of_a_version_that_knows_it(
     random_grid: Builder, tmp_path: Path
 ) -> None:

@@ -44,6 +44,14 @@ class Codec:
     flags: Compression
     background: AnyArray
 
+    def is_background(self, values: AnyArray) -> BoolArray:
+        """Which of `values` `[..., component]` are background; it may be not a number."""
+        same: BoolArray = np.asarray(values == self.background)
+        if self.value_type.dtype.kind == "f" and np.isnan(self.background).any():
+            same |= np.isnan(values) & np.isnan(self.background)
+        # Along an axis of one, `all` would take most of the time of reading a node.
+        return same[..., 0] if self.value_type.components == 1 else same.all(axis=-1)
+
     def read_values(self, cursor: Cursor, active: BoolArray, *, is_leaf: bool) -> AnyArray:
         """Values of the consecutive nodes at the cursor, whose masks are `active` `[n, cell]`.
 
@@ -136,7 +144,7 @@ class Codec:
         """
         for start in range(0, len(active), _BATCH):
             batch = slice(start, start + _BATCH)
-            implied = (values[batch] == self.background).all(axis=-1) | active[batch]
+            implied = self.is_background(values[batch]) | active[batch]
             if ignored is not None:
                 implied |= ignored[batch]
             omits = implied.all(axis=1) & (Compression.ACTIVE_MASK in self.flags)

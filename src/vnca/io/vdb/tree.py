@@ -118,9 +118,7 @@ class _Topology:
         return origin + slot_origins(np.flatnonzero(has_child), per_edge, slot_edge)
 
     def _is_tile(self, values: AnyArray, active: BoolArray) -> BoolArray:
-        differs = values != self.codec.background
-        # Along an axis of one, `any` would take most of the time.
-        return active | (differs[..., 0] if differs.shape[-1] == 1 else differs.any(axis=-1))
+        return active | ~self.codec.is_background(values)
 
     def _add_tiles(self, origins: AnyArray, edge: int, values: AnyArray, active: BoolArray) -> None:
         if len(origins):
