@@ -46,7 +46,7 @@ class Codec:
 
     def is_background(self, values: AnyArray) -> BoolArray:
         """Which of `values` `[..., component]` are background; it may be not a number."""
-        same: BoolArray = np.asarray(values == self.background)
+        same: AnyArray = np.asarray(values == self.background)
         if self.value_type.dtype.kind == "f" and np.isnan(self.background).any():
             same |= np.isnan(values) & np.isnan(self.background)
         # Along an axis of one, `all` would take most of the time of reading a node.
@@ -144,7 +144,7 @@ class Codec:
         """
         for start in range(0, len(active), _BATCH):
             batch = slice(start, start + _BATCH)
-            implied = self.is_background(values[batch]) | active[batch]
+            implied: AnyArray = self.is_background(values[batch]) | active[batch]
             if ignored is not None:
                 implied |= ignored[batch]
             omits = implied.all(axis=1) & (Compression.ACTIVE_MASK in self.flags)
