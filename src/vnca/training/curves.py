@@ -29,7 +29,10 @@ class Curves:
         """
         from tensorboard.summary.writer.record_writer import RecordWriter
 
-        name = f"{time.time():010.0f}.{socket.gethostname()}.{os.getpid()}.0"
+        # TensorBoard reads them in the order of their names: this one has to be the last.
+        earlier = [path.name.split(".")[3] for path in folder.glob(PATTERN)]
+        begun = max(int(time.time()), *(int(at) + 1 for at in earlier if at.isdecimal()), 0)
+        name = f"{begun:010}.{socket.gethostname()}.{os.getpid()}.0"
         self._path = folder / PATTERN.replace("*", name)
         with self._told():
             self._records = RecordWriter(self._path.open("xb"))
