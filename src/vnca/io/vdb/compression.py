@@ -46,11 +46,12 @@ class Codec:
 
     def is_background(self, values: AnyArray) -> BoolArray:
         """Which of `values` `[..., component]` are background; it may be not a number."""
-        same: AnyArray = np.asarray(values == self.background)
+        same = np.asarray(values == self.background)
         if self.value_type.dtype.kind == "f" and np.isnan(self.background).any():
             same |= np.isnan(values) & np.isnan(self.background)
-        # Along an axis of one, `all` would take most of the time of reading a node.
-        return same[..., 0] if self.value_type.components == 1 else same.all(axis=-1)
+        # Along an axis of one, the other would take most of the time of reading a node.
+        is_scalar = self.value_type.components == 1
+        return same[..., 0] if is_scalar else np.logical_and.reduce(same, axis=-1)
 
     def read_values(self, cursor: Cursor, active: BoolArray, *, is_leaf: bool) -> AnyArray:
         """Values of the consecutive nodes at the cursor, whose masks are `active` `[n, cell]`.
@@ -144,10 +145,10 @@ class Codec:
         """
         for start in range(0, len(active), _BATCH):
             batch = slice(start, start + _BATCH)
-            implied: AnyArray = self.is_background(values[batch]) | active[batch]
+            implied = self.is_background(values[batch]) | active[batch]
             if ignored is not None:
                 implied |= ignored[batch]
-            omits = implied.all(axis=1) & (Compression.ACTIVE_MASK in self.flags)
+            omits = np.logical_and.reduce(implied, axis=1) & (Compression.ACTIVE_MASK in self.flags)
             stored = np.where(omits[:, None], active[batch], True)
             packed = memoryview(self._to_stored(values[batch][stored]).tobytes())
             bytes_a_value = (
