@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import tyro
 
-from vnca.automaton.model import Model
-from vnca.cli.options import chosen, parse, say
+from vnca.automaton.model import MODEL_NAME, Model
+from vnca.cli.options import chosen, is_given, parse, say
 from vnca.cli.sequence import beside
 from vnca.cli.train import Train, train
 from vnca.errors import OptionError
@@ -82,7 +82,7 @@ def _check_size(size: int) -> None:
 
 def run(arguments: Sequence[str]) -> None:
     """Read the options and measure."""
-    if any(word.partition("=")[0] == "--ablation" for word in arguments):
+    if is_given(arguments, "--ablation"):
         missing: Any = tyro.MISSING
         preset = chosen(arguments, "--preset", "draft")
         defaults = Ablation(
@@ -169,7 +169,7 @@ def _configurations(options: Ablation) -> Iterator[tuple[str, TrainConfig]]:
 
 def _is_trained(folder: Path, config: TrainConfig) -> bool:
     """Whether the folder holds a finished run of this configuration."""
-    if not (folder / "model.safetensors").exists():
+    if not (folder / MODEL_NAME).exists():
         return False
     trained = Model.load(folder)
     return (

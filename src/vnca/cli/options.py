@@ -31,6 +31,11 @@ def chosen(arguments: Sequence[str], option: str, default: str) -> str:
     return value
 
 
+def is_given(arguments: Sequence[str], option: str) -> bool:
+    """Whether an option that decides how the others are read is among the arguments."""
+    return any(word.partition("=")[0] == option for word in arguments)
+
+
 def say(line: str) -> None:
     """Tell the user something that is not the result: on standard error, on a line of its own."""
     end_line()

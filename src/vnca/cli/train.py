@@ -11,7 +11,7 @@ import torch
 import tyro
 
 from vnca.automaton.model import MODEL_NAME, Model
-from vnca.cli.options import chosen, parse, say
+from vnca.cli.options import chosen, is_given, parse, say
 from vnca.cli.progress import Progress
 from vnca.cli.recorded import recorded, restored
 from vnca.cli.sequence import beside
@@ -83,7 +83,7 @@ class Resume:
 
 def run(arguments: Sequence[str]) -> None:
     """Read the options and train, or go on with a training."""
-    if any(word.partition("=")[0] == "--resume" for word in arguments):
+    if is_given(arguments, "--resume"):
         resume(parse("train", Resume, arguments))
         return
     preset = chosen(arguments, "--preset", "draft")
