@@ -23,7 +23,7 @@ def choose(backend: str = "auto", *, device: str = "cpu") -> Backend:
         device: Kind of device that holds the state, as torch names it.
 
     Raises:
-        BackendUnavailableError: If the backend asked for, or any at all, cannot run here.
+        BackendUnavailableError: If the backend asked for cannot run here.
         OptionError: If there is no backend of that name.
     """
     if backend == "auto":
@@ -33,13 +33,8 @@ def choose(backend: str = "auto", *, device: str = "cpu") -> Backend:
             if device != "cpu":
                 _say_once(f"vnca: running the {fast} step on {device}")
             return fast
-        why_none = _UNAVAILABLE["reference"](device)
-        if why_none is None:
-            _say_once(f"vnca: running the slow reference step: {why_slow}")
-            return "reference"
-        raise BackendUnavailableError(
-            f"no backend can run the update step: {fast}: {why_slow}; reference: {why_none}"
-        )
+        _say_once(f"vnca: running the slow reference step: {why_slow}")
+        return "reference"
     for name, unavailable in _UNAVAILABLE.items():
         if backend == name:
             reason = unavailable(device)
@@ -73,8 +68,8 @@ def torch_step(
 def array_step(backend: str = "auto", *, threads: int | None = None) -> Callable[..., FloatArray]:
     """The step on arrays, called as `vnca.kernels.update.native.forward` is, up to `stencil`.
 
-    Of the backends only the reference uses torch, and as many threads as torch does. Triton works
-    on tensors that stay on the GPU, not on arrays.
+    None of them uses torch: the reference on arrays is written in numpy, and uses as many threads
+    as that does. Triton works on tensors that stay on the GPU, not on arrays.
     """
     if backend == "triton":
         raise BackendUnavailableError(
@@ -83,9 +78,9 @@ def array_step(backend: str = "auto", *, threads: int | None = None) -> Callable
         )
     if choose(backend) == "native":
         return partial(native.forward, threads=threads)
-    from vnca.kernels.update.reference import update_arrays
+    from vnca.kernels.update.array_reference import update
 
-    return update_arrays
+    return update
 
 
 def _native_unavailable(device: str) -> str | None:
@@ -95,24 +90,17 @@ def _native_unavailable(device: str) -> str | None:
 
 
 def _triton_unavailable(device: str) -> str | None:
-    without_torch = _reference_unavailable(device)
-    if without_torch is not None:
-        return without_torch
+    if importlib.util.find_spec("torch") is None:
+        return "it needs torch; install vnca[train]"
     from vnca.kernels.update.triton import unavailable
 
     return unavailable(device)
 
 
-def _reference_unavailable(device: str) -> str | None:
-    if importlib.util.find_spec("torch") is None:
-        return "it needs torch; install vnca[train]"
-    return None
-
-
 _UNAVAILABLE: dict[Backend, Callable[[str], str | None]] = {
     "native": _native_unavailable,
     "triton": _triton_unavailable,
-    "reference": _reference_unavailable,
+    "reference": lambda device: None,
 }
 """Why a backend cannot run on a kind of device, or nothing; asked only of those that are needed:
 some answers take importing torch."""

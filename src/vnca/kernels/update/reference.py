@@ -5,8 +5,6 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from vnca.typing import AnyArray, FloatArray, IntArray
-
 SLAB = 4096
 """Cells worked through at a time: their perception and hidden layer stay in cache."""
 
@@ -80,28 +78,6 @@ def update(
     result = _Update.apply(state, rows, neighbours, priors, *weights, stencil)
     assert isinstance(result, Tensor)
     return result
-
-
-def update_arrays(
-    state: FloatArray,
-    rows: IntArray,
-    neighbours: IntArray,
-    priors: FloatArray,
-    hidden: FloatArray,
-    bias: FloatArray,
-    output: FloatArray,
-    stencil: FloatArray,
-) -> FloatArray:
-    """`update` on arrays, without gradients."""
-    weights = Weights(_tensor(hidden), _tensor(bias), _tensor(output))
-    around = _tensor(rows), _tensor(neighbours), _tensor(priors)
-    with torch.no_grad():
-        return update(_tensor(state), *around, weights, _tensor(stencil)).numpy()
-
-
-def _tensor(array: AnyArray) -> Tensor:
-    # torch warns about memory that it could write to but must not.
-    return torch.from_numpy(array if array.flags.writeable else array.copy())
 
 
 class _Update(torch.autograd.Function):
