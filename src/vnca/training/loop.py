@@ -62,6 +62,8 @@ class Trainer:
     Attributes:
         config: The hyperparameters.
         scene: The frame.
+        step: What computes the automaton, called as `vnca.kernels.update.reference.update` is;
+            another that does the same may take its place.
         iteration: Iterations done.
     """
 
@@ -97,7 +99,7 @@ class Trainer:
                 for w in (rule.hidden, rule.bias, rule.output)
             )
         )
-        self._step = torch_step(config.backend, device=torch.device(device).type)
+        self.step = torch_step(config.backend, device=torch.device(device).type)
         self._stencil = torch.from_numpy(
             stencil(
                 sobel_divisor=config.rule.sobel_divisor,
@@ -239,7 +241,7 @@ class Trainer:
                 step=step,
                 probability=self.config.rule.update_probability,
             )
-            state = self._step(
+            state = self.step(
                 state,
                 torch.from_numpy(rows).to(state.device),
                 self.scene.neighbours,
