@@ -253,7 +253,7 @@ class Without:
     def __getattr__(self, name):
         return getattr(self.finder, name)
     def find_spec(self, name, *where):
-        is_absent = name.partition(".")[0] in {TRAINING_ONLY}
+        is_absent = name.partition(".")[0] in {TRAINING_ONLY} or name == ABSENT
         return None if is_absent else self.finder.find_spec(name, *where)
 sys.meta_path[:] = map(Without, sys.meta_path)
 from vnca.cli import main
@@ -261,8 +261,9 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-def without_training(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", WITHOUT, *map(str, arguments)]
+def without_training(*arguments: object, absent: str = "") -> subprocess.CompletedProcess[str]:
+    """Runs the command line where only the core dependencies are, and not the module `absent`."""
+    command = [sys.executable, "-c", f"ABSENT = {absent!r}{WITHOUT}", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, env=os.environ)
 
 
@@ -275,17 +276,64 @@ def test_applying_a_style_needs_nothing_that_training_does(
     expected = painted()
     for path in expected.iterdir():
         assert (out / path.name).read_bytes() == path.read_bytes()
-    done = without_training("info", model)
+    for path in (model, out / "ball_0001.vdb"):
+        done = without_training("info", path)
+        assert done.returncode == 0, done.stderr
+        assert "weights" in done.stdout or "Cd: vec3s" in done.stdout
+    for command in ("--help", "stylize --help"):
+        done = without_training(*command.split())
+        assert done.returncode == 0, done.stderr
+
+
+def test_a_blender_frame_and_mantaflow_npz_are_painted_without_training(
+    painted: Paint, model: Path, tmp_path: Path
+) -> None:
+    random = np.random.default_rng(0)
+    for name, components in (("d", 1), ("v", 3)):
+        (tmp_path / "npz" / name).mkdir(parents=True)
+        values = random.random((6, 7, 8, components)).astype(np.float32)
+        np.savez_compressed(tmp_path / "npz" / name / "004.npz", x=values)
+    blender = Path(__file__).parent.parent / "data" / "plume_sphere_0030.vdb"
+    for sequence in (blender, tmp_path / "npz"):
+        options = () if sequence != blender else ("--velocity-units", "mantaflow", "--fps", 24)
+        out = tmp_path / f"bare_{sequence.stem}"
+        done = without_training("stylize", model, sequence, "--out", out, *QUICK, *options)
+        assert done.returncode == 0, done.stderr
+        (expected,) = painted(*options, sequence=sequence).iterdir()
+        assert (out / expected.name).read_bytes() == expected.read_bytes()
+
+
+def test_without_torch_all_is_painted_and_a_line_says_how_to_get_the_preview(
+    painted: Paint, model: Path, smoke: Path, tmp_path: Path
+) -> None:
+    out, film = tmp_path / "bare", tmp_path / "film.mp4"
+    done = without_training("stylize", model, smoke, "--out", out, *QUICK, "--preview", film)
     assert done.returncode == 0, done.stderr
-    assert "weights" in done.stdout
+    (line,) = (line for line in done.stderr.splitlines() if "preview" in line)
+    assert "need torch: pip install 'vnca[train]'" in line
+    assert f"vnca render {out}" in line
+    assert "film:" not in done.stderr
+    assert sorted(p.name for p in out.iterdir()) == sorted(p.name for p in painted().iterdir())
+    assert not film.exists()
 
 
-def test_what_is_missing_is_named(model: Path, smoke: Path, style: Path, tmp_path: Path) -> None:
-    stylize = ["stylize", model, smoke, "--out", tmp_path / "out"]
+def test_without_torch_and_a_compiler_the_slow_step_runs_and_says_so_once(
+    painted: Paint, model: Path, smoke: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "slow"
+    absent = "vnca.kernels.update._native"
+    done = without_training("stylize", model, smoke, "--out", out, *QUICK, absent=absent)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("running the slow reference step: its extension was not built") == 1
+    fast = painted()
+    a, b = (dense(grids(folder / "ball_0003.vdb")["Cd"])[0] for folder in (out, fast))
+    np.testing.assert_allclose(a, b, atol=1e-4)
+
+
+def test_what_is_missing_is_named(smoke: Path, style: Path, tmp_path: Path) -> None:
     for arguments in (
         ["train", smoke / "ball_0001.vdb", style, "--out", tmp_path / "out"],
-        [*stylize, "--preview", tmp_path / "film.gif"],
-        [*stylize, "--backend", "reference"],
+        ["render", smoke, "--out", tmp_path / "out" / "film.gif"],
         ["simulate", "plume", "--out", tmp_path / "out"],
     ):
         done = without_training(*arguments)

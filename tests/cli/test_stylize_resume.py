@@ -210,6 +210,14 @@ def test_what_does_not_touch_the_files_may_be_another(
     assert unfinished.files == unharmed
 
 
+def test_the_steps_of_the_rule_may_be_asked_for_or_not(painted: Painted, during: During) -> None:
+    steps = Model.load(painted.model).rule.config.steps_per_frame
+    command = ("stylize", painted.model, painted.smoke, "--out", painted.out, "--warmup", 0)
+    during(3, control_c)
+    assert painted.vnca(*command).code == 130
+    assert painted.vnca(*command, "--steps-per-frame", steps, "--resume").code == 0
+
+
 def test_without_resume_a_painting_starts_anew(
     unfinished: Painted, during: During, unharmed: dict[str, bytes]
 ) -> None:

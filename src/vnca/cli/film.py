@@ -10,7 +10,7 @@ import numpy as np
 
 from vnca.camera import frame_box
 from vnca.colour import srgb_to_linear
-from vnca.errors import OptionError
+from vnca.errors import BackendUnavailableError, OptionError
 from vnca.io.video import FilmWriter
 from vnca.typing import Box, FloatArray, Index
 
@@ -81,11 +81,16 @@ class Film:
             device: Where to render.
 
         Raises:
+            BackendUnavailableError: If what it takes to render is not installed.
             OptionError: If the path is no film, or the frame rate cannot work.
             OutputError: If the film cannot be written.
         """
-        import vnca.render.view  # noqa: F401  A missing torch is best told before long work.
-
+        try:
+            import vnca.render.view  # noqa: F401  A missing torch is best told before long work.
+        except ModuleNotFoundError as error:
+            raise BackendUnavailableError(
+                f"films need {error.name}: pip install 'vnca[train]'"
+            ) from error
         self._config, self._box, self._frames, self._device = config, box, frames, device
         self._writer = FilmWriter(path, fps=config.fps)
         self._shown = 0

@@ -21,7 +21,7 @@ from vnca.cli.options import parse, say
 from vnca.cli.progress import Progress
 from vnca.cli.sequence import open_sequence, sequence_box
 from vnca.cli.termination import finishing
-from vnca.errors import ModelError, OptionError
+from vnca.errors import BackendUnavailableError, ModelError, OptionError
 from vnca.files import remove_leftovers, writable_file, writable_folder
 from vnca.io.painted import read_colour
 from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
@@ -131,10 +131,11 @@ def paint(options: Stylize, model: Model | None = None) -> None:
     smoke = with_fitted_scale(options.smoke, sequence)
     box = sequence_box(sequence, smoke, without_broken=options.on_error != "stop")
     backend = choose(options.backend)
+    roll = Roll(rule, stepper(rule, backend), options.config, box)
     painter = Painter(
         sequence,
         options.out,
-        Roll(rule, stepper(rule, backend), options.config, box),
+        roll,
         smoke,
         options.colour_grid,
         options.on_error,
@@ -151,12 +152,13 @@ def paint(options: Stylize, model: Model | None = None) -> None:
                 for values in (options.config, smoke)
                 for name, value in dataclasses.asdict(values).items()
             },
+            "--steps-per-frame": roll.steps_per_frame,
         },
         tell=say,
     )
-    _paint(painter, options)
+    is_filmed = _paint(painter, options)
     say(f"painted: {options.out}")
-    if options.preview:
+    if is_filmed:
         say(f"film: {options.preview}")
 
 
@@ -169,16 +171,16 @@ def _digest(rule: Rule) -> str:
     return digest.hexdigest()
 
 
-def _paint(painter: Painter, options: Stylize) -> None:
-    """Paint to the end, to Ctrl-C or, once a frame is finished, to SIGTERM."""
+def _paint(painter: Painter, options: Stylize) -> bool:
+    """Paint to the end, to Ctrl-C or, once a frame is finished, to SIGTERM.
+
+    Returns:
+        Whether it was filmed.
+    """
     sequence, scales = painter.sequence, painter.roll.rule.scales
     finished = 0
     with ExitStack() as stack:
-        film = None
-        if options.preview is not None:
-            film = stack.enter_context(
-                Film(options.preview, options.film, painter.roll.box, frames=len(sequence))
-            )
+        film = _film(options, painter, stack)
         unfinished = painter.begin(resume=options.resume)
         already = len(unfinished.sources)
         try:
@@ -200,6 +202,19 @@ def _paint(painter: Painter, options: Stylize) -> None:
             say(f"stopped after {done} of {len(sequence)} frames; --resume goes on")
             raise
     painter.discard()
+    return film is not None
+
+
+def _film(options: Stylize, painter: Painter, stack: ExitStack) -> Film | None:
+    """The film of a preview, if one is wanted and what it takes is installed."""
+    if options.preview is None:
+        return None
+    try:
+        film = Film(options.preview, options.film, painter.roll.box, frames=len(painter.sequence))
+        return stack.enter_context(film)
+    except BackendUnavailableError as error:
+        say(f"{error}; painting without a preview: vnca render {options.out} makes one later")
+        return None
 
 
 def _read_painted(path: Path, source: Path, options: Stylize) -> tuple[Volume, FloatArray]:

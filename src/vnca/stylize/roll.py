@@ -82,6 +82,12 @@ class Roll:
     config: StylizeConfig
     box: Box
 
+    @property
+    def steps_per_frame(self) -> int:
+        """Those asked for, or else those of training."""
+        asked = self.config.steps_per_frame
+        return self.rule.config.steps_per_frame if asked is None else asked
+
     def start(self) -> RollState:
         """The state before the first frame."""
         return RollState.empty(self.rule.config.channels)
@@ -103,9 +109,7 @@ class Roll:
         if len(domain) == 0:
             state = RollState.empty(rule.config.channels, state.steps_done)
             return Painting(smoke, smoke.density, _unpainted(smoke), state)
-        steps = config.steps_per_frame
-        if steps is None:
-            steps = rule.config.steps_per_frame
+        steps = self.steps_per_frame
         if len(state.cells) == 0:
             values, steps = domain.seed(rule.config.channels), config.warmup + steps
         else:
