@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vnca.automaton.domain import Domain, dilate
+from vnca.errors import OptionError
 from vnca.kernels.update.stencil import OFFSETS
 from vnca.typing import Box
 
@@ -64,6 +65,16 @@ def test_cells_live_within_reach_of_smoke_and_inside_the_box() -> None:
     domain = Domain.around_smoke(density, (10, 0, 0), threshold=0.5, reach=2, box=box)
     assert len(domain) == 3 * 5 * 5
     assert domain.cells[:, 0].max() == 12
+
+
+def test_a_box_can_live_as_a_whole_unless_it_is_absurdly_large() -> None:
+    box = Box((3, -2, 0), (6, 2, 5))
+    domain = Domain.filling(box)
+    assert len(domain) == 3 * 4 * 5
+    assert domain.scatter(np.ones(len(domain)), box).all()
+    assert (domain.neighbours < len(domain)).all()
+    with pytest.raises(OptionError, match=r"--domain box: .* 134742016 cells.*--domain active"):
+        Domain.filling(Box((0, 0, 0), (512, 512, 514)))
 
 
 def test_no_smoke_gives_no_cells() -> None:

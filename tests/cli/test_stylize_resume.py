@@ -176,6 +176,7 @@ def without_a_painted_frame(painted: Painted) -> None:
     [
         (["--seed", 1], "--seed is another than when the painting was begun (0, now 1)"),
         (["--steps-per-frame", 5], "--steps-per-frame"),
+        (["--domain", "box"], '--domain is another than when the painting was begun ("active", '),
         (["--strength", 0.5], "--strength"),
         (["--density-scale", 0.5], "--density-scale"),
         (["--colour-grid", "color"], "--colour-grid"),

@@ -1,4 +1,5 @@
 import dataclasses
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -7,7 +8,9 @@ import pytest
 
 from vnca.automaton.domain import dilate
 from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.colour import srgb_to_linear
 from vnca.errors import OptionError
+from vnca.kernels.update.mask import changing_rows, hash_cells
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.roll import Painting, Roll, stylize
@@ -40,7 +43,7 @@ def nothing(frame: int) -> Volume:
     return Volume(np.zeros((0, 0, 0), np.float32), None, (0, 0, 0), np.eye(4), frame)
 
 
-def rolled(frames: list[Volume], box: Box = BOX, **options: float) -> list[Painting]:
+def rolled(frames: list[Volume], box: Box = BOX, **options: float | str) -> list[Painting]:
     config = StylizeConfig(**{"warmup": 6, "steps_per_frame": 2, **options})  # type: ignore[arg-type]
     return list(stylize(frames, RULE, counting_step, config, box=box))
 
@@ -48,6 +51,13 @@ def rolled(frames: list[Volume], box: Box = BOX, **options: float) -> list[Paint
 def at(painting: Painting, cell: tuple[int, int, int]) -> float:
     x, y, z = (c - o for c, o in zip(cell, painting.smoke.origin, strict=True))
     return float(painting.colour[x, y, z, 0])
+
+
+def changes(cell: tuple[int, int, int], *, steps: int) -> int:
+    """How often a cell changes in the first steps of a sequence."""
+    hashes = hash_cells(np.array([cell], np.int32))
+    options = {"seed": 0, "probability": RULE.config.update_probability}
+    return sum(len(changing_rows(hashes, step=step, **options)) for step in range(steps))  # type: ignore[arg-type]
 
 
 def test_a_cell_keeps_its_state_while_the_smoke_moves_over_it() -> None:
@@ -142,3 +152,31 @@ def test_cells_live_as_far_from_the_smoke_as_the_rule_was_trained_with(reach: in
     (painting,) = stylize([smoke], rule, counting_step, StylizeConfig(), box=smoke.box)
     lived = (painting.colour != 1).any(axis=-1)
     np.testing.assert_array_equal(lived, dilate(smoke.density > 0.5, reach))
+
+
+def test_cells_of_the_whole_box_live_on_however_far_the_smoke_jumps() -> None:
+    there = (12, 5, 0)
+    frames = [ball(0), nothing(1), ball(2, there)]
+    active, box = (rolled(frames, domain=domain)[-1] for domain in ("active", "box"))
+    stayed = rolled([ball(0)] * 3, domain="box")[-1]
+    assert at(active, there) < at(box, there)
+    assert at(box, (12, 5, 0)) == pytest.approx(
+        srgb_to_linear(np.array(0.5 + 0.01 * changes(there, steps=12)))
+    )
+    assert len(box.state.cells) == len(stayed.state.cells) == math.prod(BOX.grown(1).shape)
+
+
+def test_faint_smoke_is_painted_where_the_whole_box_lives() -> None:
+    faint = dataclasses.replace(ball(0), density=np.full((7, 7, 7), 1e-4, np.float32))
+    assert (rolled([faint], domain="active")[0].colour == 1).all()
+    assert (rolled([faint], domain="box")[0].colour != 1).all()
+
+
+def test_cells_live_where_they_did_in_training_unless_asked_otherwise() -> None:
+    boxed = dataclasses.replace(RULE, config=dataclasses.replace(RULE.config, domain="box"))
+    for rule, asked, kind in (
+        *((RULE, None, "active"), (RULE, "box", "box")),
+        *((boxed, None, "box"), (boxed, "active", "active")),
+    ):
+        roll = Roll(rule, counting_step, StylizeConfig(domain=asked), BOX)  # type: ignore[arg-type]
+        assert roll.domain_kind == kind

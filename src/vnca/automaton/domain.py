@@ -1,11 +1,13 @@
-"""Where cells live: the set of cells within reach of the smoke, in index space."""
+"""Where cells live: within reach of the smoke or in all of its box, in index space."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
+from vnca.errors import OptionError
 from vnca.kernels.update.mask import HashArray, hash_cells
 from vnca.kernels.update.stencil import OFFSETS
 from vnca.typing import AnyArray, BoolArray, Box, FloatArray, Index, IntArray
@@ -13,7 +15,12 @@ from vnca.typing import AnyArray, BoolArray, Box, FloatArray, Index, IntArray
 BRICK = 8
 """Cells are listed brick by brick, so that neighbours in space are neighbours in memory."""
 
+MOST_CELLS = 2**27
+"""A larger box (512³) may not live as a whole."""
+
 Border = Literal["replicate", "circular"]
+DomainKind = Literal["active", "box"]
+"""Cells within reach of the smoke, or all cells of its box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +75,21 @@ class Domain:
             part = density[covered.slices(Box(origin, (x, y, z)))]
             smoke[covered.slices(inside)] = part > threshold
         return cls.from_mask(dilate(smoke, reach), inside.lower, box=box)
+
+    @classmethod
+    def filling(cls, box: Box) -> "Domain":
+        """All cells of a box.
+
+        Raises:
+            OptionError: If there are too many.
+        """
+        if math.prod(box.shape) > MOST_CELLS:
+            raise OptionError(
+                f"--domain box: the box of the smoke, {box.lower} to {box.upper}, has "
+                f"{math.prod(box.shape)} cells, and at most {MOST_CELLS} can live; "
+                "use --domain active"
+            )
+        return cls.from_mask(np.ones(box.shape, dtype=bool), box.lower)
 
     def __len__(self) -> int:
         """Number of cells alive."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vnca.automaton.domain import DomainKind
 from vnca.errors import OptionError, ShapeError
 from vnca.kernels.update.stencil import FILTERS
 from vnca.typing import FloatArray
@@ -34,6 +35,8 @@ class RuleConfig:
     """Chance of a cell to change in a step."""
     steps_per_frame: int = 16
     """Steps of the automaton between two frames; the rule is taught to move at this pace."""
+    domain: DomainKind = "active"
+    """Where cells live: within reach of the smoke, or in all of its box as in the paper."""
     reach: int = 1
     """Cells live up to this far from the smoke; beyond is the outside that border cells see."""
     sobel_divisor: float = 32.0

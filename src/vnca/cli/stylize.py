@@ -153,6 +153,7 @@ def paint(options: Stylize, model: Model | None = None) -> None:
                 for name, value in dataclasses.asdict(values).items()
             },
             "--steps-per-frame": roll.steps_per_frame,
+            "--domain": roll.domain_kind,
         },
         tell=say,
     )

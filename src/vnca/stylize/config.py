@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from vnca.automaton.domain import DomainKind
 from vnca.errors import OptionError
 
 
@@ -13,6 +14,9 @@ class StylizeConfig:
     """Steps of the automaton between two frames; as many as in training unless given."""
     warmup: int = 64
     """Steps on the first frame before it is painted."""
+    domain: DomainKind | None = None
+    """Where cells live: within reach of the smoke (active) or in all of its box; where they did in
+    training unless given."""
     strength: float = 1.0
     """Colour of the painting, from 0 (white smoke) to 1."""
     density_strength: float = 1.0

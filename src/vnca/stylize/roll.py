@@ -9,10 +9,11 @@ Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from vnca.automaton.domain import Domain
+from vnca.automaton.domain import Domain, DomainKind
 from vnca.automaton.paint import colours, density_factors
 from vnca.automaton.priors import priors
 from vnca.automaton.rule import SMOKE_THRESHOLD, Rule
@@ -88,6 +89,11 @@ class Roll:
         asked = self.config.steps_per_frame
         return self.rule.config.steps_per_frame if asked is None else asked
 
+    @property
+    def domain_kind(self) -> DomainKind:
+        """Where cells live: as asked for, or else as in training."""
+        return self.config.domain or self.rule.config.domain
+
     def start(self) -> RollState:
         """The state before the first frame."""
         return RollState.empty(self.rule.config.channels)
@@ -95,17 +101,11 @@ class Roll:
     def paint(self, smoke: Volume, state: RollState) -> Painting:
         """The next frame, from the state that the one before it left.
 
-        A frame without smoke passes through, and the painting starts afresh after it.
+        A frame without smoke passes through. The painting starts afresh after it, unless cells
+        live in the whole box.
         """
         rule, config = self.rule, self.config
-        box = self.box.grown(rule.config.reach)
-        domain = Domain.around_smoke(
-            smoke.density,
-            smoke.origin,
-            threshold=SMOKE_THRESHOLD * rule.scales.density,
-            reach=rule.config.reach,
-            box=box,
-        )
+        domain = self._domain(smoke)
         if len(domain) == 0:
             state = RollState.empty(rule.config.channels, state.steps_done)
             return Painting(smoke, smoke.density, _unpainted(smoke), state)
@@ -113,7 +113,7 @@ class Roll:
         if len(state.cells) == 0:
             values, steps = domain.seed(rule.config.channels), config.warmup + steps
         else:
-            values = Domain(state.cells, box).carry(state.values, domain)
+            values = Domain(state.cells, domain.box).carry(state.values, domain)
         told = priors(domain, smoke, rule)
         done = state.steps_done + steps
         for number in range(state.steps_done, done):
@@ -125,6 +125,22 @@ class Roll:
             )
             values = self.step(values, rows, domain.neighbours, told)
         return _shown(smoke, RollState(domain.cells, values, done), config)
+
+    def _domain(self, smoke: Volume) -> Domain:
+        """The cells that live in a frame."""
+        if self.domain_kind == "box":
+            return self._whole_box
+        return Domain.around_smoke(
+            smoke.density,
+            smoke.origin,
+            threshold=SMOKE_THRESHOLD * self.rule.scales.density,
+            reach=self.rule.config.reach,
+            box=self.box.grown(self.rule.config.reach),
+        )
+
+    @cached_property
+    def _whole_box(self) -> Domain:
+        return Domain.filling(self.box.grown(self.rule.config.reach))
 
 
 def stylize(
