@@ -61,6 +61,10 @@ class DivergenceError(VncaError):
     """Training left the range of numbers, and lower learning rates did not help."""
 
 
+class DisagreementError(VncaError):
+    """Backends that must compute the same do not."""
+
+
 class OutOfMemoryError(VncaError):
     """The work asked for does not fit into memory."""
 
