@@ -214,7 +214,8 @@ def _film(options: Stylize, painter: Painter, stack: ExitStack) -> Film | None:
         film = Film(options.preview, options.film, painter.roll.box, frames=len(painter.sequence))
         return stack.enter_context(film)
     except BackendUnavailableError as error:
-        say(f"{error}; painting without a preview: vnca render {options.out} makes one later")
+        later = f"vnca render {options.out} --out {options.preview}"
+        say(f"{error}; painting without a preview, which {later} makes later")
         return None
 
 
