@@ -88,6 +88,7 @@ def rewritten(path: Path, **changes: Any) -> None:
         ({"rule": {"channels": 5, "hidden": 7, "position_prior": "no"}}, "damaged.*position_prior"),
         ({"rule": {"channels": 5, "hidden": 7, "sobel_divisor": math.nan}}, "damaged.*sobel"),
         ({"rule": {"channels": 5, "hidden": 7, "steps_per_frame": 10**9}}, "damaged.*4096"),
+        ({"rule": {"channels": 5, "hidden": 7, "domain": "all"}}, "damaged.*domain: 'all'"),
         ({"scales": {"density": True}}, "damaged.*density"),
         ({"scales": {"density": 10**400}}, "damaged.*density"),
         ({"scales": []}, "damaged.*Scales"),
