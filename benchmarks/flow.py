@@ -47,8 +47,8 @@ from vnca.training.config import TrainConfig
 from vnca.training.flow.displacement import random_displacement
 from vnca.training.flow.pairs import moving_texture, random_silhouette
 from vnca.training.flow.textures import KINDS, Kind, bank, cut, log_uniform, uniform
-from vnca.training.loop import choose_scales
-from vnca.training.scene import smoke_bounds
+from vnca.training.smoke import choose_scales
+from vnca.training.smoke_scene import smoke_bounds
 
 PICTURES = ("full", "masked", "smoke")
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)

@@ -13,8 +13,8 @@ RANKS = {
     "volume": 1, "camera": 1, "colour": 1, "files": 1, "kernels": 1,
     "io": 2, "automaton": 2, "render": 2, "features": 2, "simulate": 2,
     "losses": 3, "stylize": 3,
-    "training": 4, "texturing": 4,
-    "evaluation": 5, "viewer": 5,
+    "training": 4,
+    "texturing": 5, "evaluation": 5, "viewer": 5,
     "cli": 6,
 }  # fmt: skip
 WITHOUT_TORCH = {

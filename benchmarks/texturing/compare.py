@@ -35,8 +35,7 @@ from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
 from vnca.texturing.block import border_jump, grow
 from vnca.texturing.config import PRESETS
 from vnca.texturing.distance import slice_distances
-from vnca.texturing.loop import TextureTrainer
-from vnca.texturing.scene import BlockScene
+from vnca.texturing.training import texture_trainer
 from vnca.typing import FloatArray
 
 COLUMNS = (
@@ -81,9 +80,8 @@ def train(task: Task) -> tuple[Rule, dict[str, Any]]:
     """A rule trained for the time given; its learning rate falls as over that time."""
     style, vgg = task.begin()
     config = replace(PRESETS[task.preset], features=task.features, seed=task.seed)
-    scene = BlockScene(config.block, config.slices)
     if task.iterations is None:
-        trial = TextureTrainer(scene, style, config, vgg)
+        trial = texture_trainer(style, config, vgg)
         trial.improve()
         began = time.perf_counter()
         for _ in range(8):
@@ -92,7 +90,7 @@ def train(task: Task) -> tuple[Rule, dict[str, Any]]:
         config = replace(config, iterations=max(1, round(task.seconds / pace)))
     else:
         config = replace(config, iterations=task.iterations)
-    trainer = TextureTrainer(scene, style, config, vgg)
+    trainer = texture_trainer(style, config, vgg)
     began = time.perf_counter()
     for _ in trainer.run():
         pass

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from vnca.stylize.roll import stylize as stylize_frames
     from vnca.training.config import PRESETS, TrainConfig
     from vnca.training.loop import Trainer
+    from vnca.training.smoke import smoke_trainer
     from vnca.typing import Box
     from vnca.volume import Volume
 
@@ -61,6 +62,7 @@ _HOMES = {
     "render_view": "render.view:render",
     "simulate_smoke": "simulate.scenes:simulate",
     "smoke_box": "io.smoke",
+    "smoke_trainer": "training.smoke",
     "stepper": "automaton.stepper",
     "stylize_frames": "stylize.roll:stylize",
     "write_image": "io.image",
@@ -96,6 +98,7 @@ __all__ = [
     "render_view",
     "simulate_smoke",
     "smoke_box",
+    "smoke_trainer",
     "stepper",
     "stylize_frames",
     "write_image",

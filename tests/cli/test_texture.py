@@ -14,7 +14,7 @@ from vnca.automaton.rule import DENSITY_CHANGE, RuleConfig
 from vnca.io.glb import Glb
 from vnca.io.vdb import open_vdb
 from vnca.texturing.config import TextureConfig
-from vnca.texturing.loop import initial_rule
+from vnca.texturing.training import initial_rule
 from vnca.typing import Box
 
 Vnca = Callable[..., Any]
@@ -30,7 +30,7 @@ TINY = (
 @pytest.fixture
 def texture(tmp_path: Path) -> Path:
     """The folder of a run whose model was made up."""
-    plain = {f"{name}_prior": False for name in ("position", "density", "velocity")}
+    plain: dict[str, Any] = {f"{name}_prior": False for name in ("position", "density", "velocity")}
     rule = initial_rule(TextureConfig(rule=RuleConfig(channels=6, hidden=8, **plain)))
     output = np.random.default_rng(4).normal(0, 0.3, rule.output.shape).astype(np.float32)
     output[DENSITY_CHANGE] = 0  # as training leaves it

@@ -1,6 +1,7 @@
 """A rule that grows something, a picture, and the network that compares."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from vnca.automaton.stepper import Step, stepper
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig
 from vnca.texturing.config import SliceConfig, TextureConfig
-from vnca.texturing.loop import initial_rule
+from vnca.texturing.training import initial_rule
 from vnca.typing import FloatArray
 
 
@@ -28,7 +29,7 @@ def style() -> FloatArray:
 
 @pytest.fixture(scope="session")
 def tiny_config() -> TextureConfig:
-    plain = {f"{name}_prior": False for name in ("position", "density", "velocity")}
+    plain: dict[str, Any] = {f"{name}_prior": False for name in ("position", "density", "velocity")}
     return TextureConfig(
         rule=RuleConfig(channels=6, hidden=16, **plain),
         appearance=AppearanceConfig(samples=128, layers=("relu1_1", "relu2_1", "relu3_1")),

@@ -4,7 +4,8 @@ import pytest
 
 from vnca.automaton.rule import RuleConfig
 from vnca.errors import OptionError
-from vnca.texturing.config import PRESETS, PoolConfig, SliceConfig, TextureConfig
+from vnca.texturing.config import PRESETS, SliceConfig, TextureConfig
+from vnca.training.course import PoolConfig
 
 
 def test_presets_tell_cells_nothing() -> None:

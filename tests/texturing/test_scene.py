@@ -19,6 +19,12 @@ def state_of(scene: BlockScene) -> torch.Tensor:
     return state
 
 
+def seen(
+    scene: BlockScene, state: torch.Tensor, random: np.random.Generator
+) -> tuple[torch.Tensor, torch.Tensor]:
+    return scene.pictures(state, scene.sight(random), BACKGROUND)
+
+
 def test_cells_are_told_nothing_and_see_across_the_border() -> None:
     scene = BlockScene(8, SliceConfig(size=32, count=1))
     assert not scene.priors.any()
@@ -38,7 +44,7 @@ def test_the_block_is_the_state_in_its_place() -> None:
 def test_slices_fill_the_picture_and_teach_the_colours() -> None:
     scene = BlockScene(8, SliceConfig(size=32, count=1))
     state = state_of(scene).requires_grad_()
-    picture, opacity = scene.pictures(state, np.random.default_rng(0), BACKGROUND)
+    picture, opacity = seen(scene, state, np.random.default_rng(0))
     assert picture.shape == (1, 3, 32, 32)
     assert (opacity == 1).all()
     picture.sum().backward()
@@ -49,7 +55,7 @@ def test_slices_fill_the_picture_and_teach_the_colours() -> None:
 
 def test_as_many_slices_are_cut_as_asked() -> None:
     scene = BlockScene(8, SliceConfig(size=32, count=3))
-    pictures, opacity = scene.pictures(state_of(scene), np.random.default_rng(0), BACKGROUND)
+    pictures, opacity = seen(scene, state_of(scene), np.random.default_rng(0))
     assert pictures.shape == (3, 3, 32, 32)
     assert opacity.shape == (3, 32, 32)
     assert not torch.equal(pictures[0], pictures[1])
@@ -58,9 +64,7 @@ def test_as_many_slices_are_cut_as_asked() -> None:
 def test_pictures_depend_on_the_random_stream_alone() -> None:
     scene = BlockScene(8, SliceConfig(size=32, count=1))
     state = state_of(scene)
-    one, two, other = (
-        scene.pictures(state, np.random.default_rng(seed), BACKGROUND)[0] for seed in (1, 1, 2)
-    )
+    one, two, other = (seen(scene, state, np.random.default_rng(seed))[0] for seed in (1, 1, 2))
     assert torch.equal(one, two)
     assert not torch.equal(one, other)
 
@@ -74,7 +78,7 @@ def ball(tmp_path: Path) -> Path:
 def test_views_of_a_mesh_show_its_surface_before_the_background(ball: Path) -> None:
     scene = BlockScene(8, SliceConfig(size=32, count=1, mesh=1.0), mesh=read_mesh(ball))
     state = state_of(scene).requires_grad_()
-    picture, opacity = scene.pictures(state, np.random.default_rng(0), BACKGROUND)
+    picture, opacity = seen(scene, state, np.random.default_rng(0))
     assert set(opacity.unique().tolist()) == {0.0, 1.0}
     behind = picture[0].permute(1, 2, 0)[opacity[0] == 0]
     assert (behind == behind[0]).all()
@@ -96,5 +100,5 @@ def test_slices_and_views_are_mixed_as_asked(ball: Path) -> None:
     random = np.random.default_rng(0)
     scene = BlockScene(8, SliceConfig(size=32, count=1, mesh=0.5), mesh=read_mesh(ball))
     state = state_of(scene)
-    whole = [bool((scene.pictures(state, random, BACKGROUND)[1] == 1).all()) for _ in range(40)]
+    whole = [bool((seen(scene, state, random)[1] == 1).all()) for _ in range(40)]
     assert 10 < sum(whole) < 30

@@ -16,6 +16,8 @@ from vnca.losses.motion import MotionConfig
 from vnca.training.checkpoint import Checkpoint, Thrift, fingerprints
 from vnca.training.config import TrainConfig
 from vnca.training.loop import Trainer
+from vnca.training.smoke import smoke_trainer
+from vnca.training.smoke_scene import SmokeScene
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
@@ -29,7 +31,7 @@ def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg
     """Makes a trainer of the tiny training with some options changed."""
 
     def make(**options: Any) -> Trainer:
-        return Trainer(tiny_smoke, style, replace(tiny_config, iterations=6, **options), vgg)
+        return smoke_trainer(tiny_smoke, style, replace(tiny_config, iterations=6, **options), vgg)
 
     return make
 
@@ -44,7 +46,7 @@ def same(a: Trainer, b: Trainer) -> bool:
 
 
 def through_a_file(training: Trainer, path: Path) -> Checkpoint:
-    Checkpoint(training.snapshot(), INPUTS, {"out": "run"}).save(path)
+    Checkpoint(training.snapshot(), INPUTS, "train", {"out": "run"}).save(path)
     return Checkpoint.load(path)
 
 
@@ -78,21 +80,24 @@ def test_a_snapshot_is_not_changed_by_training_on(trainer: Make) -> None:
     assert [step.loss for step in training.run()] == one
 
 
-@pytest.mark.parametrize("where", ["_roll", "_picture", "_improve"])
+@pytest.mark.parametrize(
+    ("kind", "where"),
+    [(Trainer, "_roll"), (SmokeScene, "pictures"), (Trainer, "_improve")],
+)
 def test_an_interrupted_iteration_leaves_no_trace(
-    trainer: Make, monkeypatch: pytest.MonkeyPatch, where: str
+    trainer: Make, monkeypatch: pytest.MonkeyPatch, kind: type, where: str
 ) -> None:
     training, whole = trainer(), trainer()
     losses = [step.loss for step in whole.run()]
     begun = [training.improve().loss for _ in range(2)]
     with monkeypatch.context() as patch:
-        work = getattr(Trainer, where)
+        work = getattr(kind, where)
 
         def interrupted(*arguments: Any) -> None:
             work(*arguments)
             raise KeyboardInterrupt
 
-        patch.setattr(Trainer, where, interrupted)
+        patch.setattr(kind, where, interrupted)
         with pytest.raises(KeyboardInterrupt):
             training.improve()
     left = training.snapshot()
@@ -117,26 +122,27 @@ def test_what_changed_since_is_told(trainer: Make, tmp_path: Path) -> None:
 def test_every_input_has_a_fingerprint_of_its_own(
     tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
 ) -> None:
-    own = fingerprints(tiny_smoke, style, tiny_config, vgg)
-    density, velocity = tiny_smoke.density.copy(), tiny_smoke.velocity
-    assert velocity is not None
-    density[5, 5, 5] += 1e-6
+    frame = [tiny_smoke.density, tiny_smoke.origin, tiny_smoke.velocity]
+    own = fingerprints(style, tiny_config, vgg, frame=frame)
+    density, origin, velocity = frame
+    fainter = density.copy()
+    fainter[5, 5, 5] += 1e-6
     others = {
         "frame": [
-            (replace(tiny_smoke, density=density), style, tiny_config),
-            (replace(tiny_smoke, velocity=velocity * 1.01), style, tiny_config),
-            (replace(tiny_smoke, velocity=None), style, tiny_config),
-            (replace(tiny_smoke, origin=(0, 0, 0)), style, tiny_config),
+            (style, tiny_config, [fainter, origin, velocity]),
+            (style, tiny_config, [density, origin, velocity * 1.01]),
+            (style, tiny_config, [density, origin]),
+            (style, tiny_config, [density, (0, 0, 0), velocity]),
         ],
-        "style picture": [(tiny_smoke, style[::-1], tiny_config)],
-        "options": [(tiny_smoke, style, replace(tiny_config, seed=1))],
+        "style picture": [(style[::-1], tiny_config, frame)],
+        "options": [(style, replace(tiny_config, seed=1), frame)],
     }
     for name, changes in others.items():
-        for smoke, picture, config in changes:
-            changed = fingerprints(smoke, picture, config, vgg)
+        for picture, config, arrays in changes:
+            changed = fingerprints(picture, config, vgg, frame=arrays)
             assert {n for n in own if own[n] != changed[n]} == {name}
     elsewhere = replace(tiny_config, features="/other/path.pth")
-    assert fingerprints(tiny_smoke, style, elsewhere, vgg) == own
+    assert fingerprints(style, elsewhere, vgg, frame=frame) == own
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +153,7 @@ def written(
     vgg: VGG16,
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Path:
-    training = Trainer(tiny_smoke, style, tiny_config, vgg)
+    training = smoke_trainer(tiny_smoke, style, tiny_config, vgg)
     training.improve()
     path = tmp_path_factory.mktemp("written") / "checkpoint.safetensors"
     through_a_file(training, path)
@@ -184,6 +190,7 @@ WEIGHT, STATE = "descent.now.0.weight", "pool.0"
         lambda t, d: d.update(values=[]),
         lambda t, d: d.update(values={"trainer": 3}),
         lambda t, d: d.update(inputs=None),
+        lambda t, d: d.pop("command"),
         lambda t, d: d["values"].pop("trainer"),
         lambda t, d: d["values"].pop("pool"),
         lambda t, d: d["values"]["trainer"].update(iteration=7),

@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 
 from vnca.errors import OptionError
-from vnca.training.config import PRESETS, PoolConfig, TrainConfig, ViewConfig
+from vnca.training.config import PRESETS, TrainConfig, ViewConfig
+from vnca.training.course import PoolConfig
 
 
 @pytest.mark.parametrize(

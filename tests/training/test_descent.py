@@ -11,6 +11,7 @@ from vnca.losses.appearance import Appearance, AppearanceLoss
 from vnca.training.config import TrainConfig
 from vnca.training.descent import KEEP_EVERY, MOST_RETREATS, PATIENCE, Descent
 from vnca.training.loop import Trainer
+from vnca.training.smoke import smoke_trainer
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
@@ -112,7 +113,7 @@ def test_a_restored_descent_goes_on_as_the_first_does() -> None:
 
 @pytest.fixture
 def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16) -> Trainer:
-    return Trainer(tiny_smoke, style, replace(tiny_config, iterations=20), vgg)
+    return smoke_trainer(tiny_smoke, style, replace(tiny_config, iterations=20), vgg)
 
 
 def test_training_gives_up_after_three_lower_rates_with_the_last_good_weights(
@@ -146,7 +147,7 @@ def test_an_absurd_learning_rate_is_lowered_until_states_stay_whole(
         tiny_config, iterations=PATIENCE + 5, learning_rate=50, shortest_rollout=8,
         longest_rollout=8,
     )  # fmt: skip
-    training = Trainer(tiny_smoke, style, config, vgg)
+    training = smoke_trainer(tiny_smoke, style, config, vgg)
     steps = list(training.run())
     assert [step.diverged for step in steps].count(True) == 1
     assert training.learning_rate <= 25

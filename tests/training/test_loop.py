@@ -7,9 +7,11 @@ import torch
 
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import Appearance, AppearanceLoss
-from vnca.training.config import PoolConfig, TrainConfig
+from vnca.training.config import TrainConfig
+from vnca.training.course import PoolConfig
 from vnca.training.loop import Trainer
 from vnca.training.preview import preview_sheet
+from vnca.training.smoke import smoke_trainer
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
@@ -19,7 +21,7 @@ Make = Callable[..., Trainer]
 @pytest.fixture
 def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16) -> Make:
     """Makes a trainer of the tiny training with some options changed."""
-    return lambda **options: Trainer(tiny_smoke, style, replace(tiny_config, **options), vgg)
+    return lambda **options: smoke_trainer(tiny_smoke, style, replace(tiny_config, **options), vgg)
 
 
 def weights(trainer: Trainer) -> list[FloatArray]:
@@ -170,7 +172,7 @@ def test_smoke_of_any_units_gives_the_same_rule(
 ) -> None:
     assert tiny_smoke.velocity is not None
     other = replace(tiny_smoke, density=64 * tiny_smoke.density, velocity=8 * tiny_smoke.velocity)
-    one, two = (Trainer(smoke, style, tiny_config, vgg) for smoke in (tiny_smoke, other))
+    one, two = (smoke_trainer(smoke, style, tiny_config, vgg) for smoke in (tiny_smoke, other))
     for training in (one, two):
         list(training.run())
     for ours, theirs in zip(weights(one), weights(two), strict=True):
@@ -182,7 +184,7 @@ def test_smoke_without_velocity_trains_with_either_integrand(
     tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16, mode: str
 ) -> None:
     config = replace(tiny_config, view=replace(tiny_config.view, mode=mode))  # type: ignore[arg-type]
-    training = Trainer(replace(tiny_smoke, velocity=None), style, config, vgg)
+    training = smoke_trainer(replace(tiny_smoke, velocity=None), style, config, vgg)
     assert all(np.isfinite(step.loss) for step in training.run())
     assert training.rule().scales.velocity == 1
 

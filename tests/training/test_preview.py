@@ -2,8 +2,9 @@ import numpy as np
 
 from vnca.features.vgg import VGG16
 from vnca.training.config import TrainConfig
-from vnca.training.loop import Trainer
-from vnca.training.preview import SIZE, VIEWS, preview_sheet
+from vnca.training.preview import SIZE, preview_sheet
+from vnca.training.smoke import smoke_trainer
+from vnca.training.smoke_scene import PORTRAITS
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
@@ -11,13 +12,13 @@ from vnca.volume import Volume
 def test_a_preview_shows_the_style_and_every_view(
     tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
 ) -> None:
-    sheet = preview_sheet(Trainer(tiny_smoke, style, tiny_config, vgg), style)
+    sheet = preview_sheet(smoke_trainer(tiny_smoke, style, tiny_config, vgg), style)
     rows, columns, channels = sheet.shape
     assert rows >= SIZE
-    assert columns >= SIZE * (1 + len(VIEWS))
+    assert columns >= SIZE * (1 + len(PORTRAITS))
     assert channels == 3
     assert np.isfinite(sheet).all()
     assert sheet.min() >= 0
     assert sheet.max() <= 1
-    parts = np.array_split(sheet, 1 + len(VIEWS), axis=1)
+    parts = np.array_split(sheet, 1 + len(PORTRAITS), axis=1)
     assert all(part.std() > 0.01 for part in parts)

@@ -1,5 +1,6 @@
-"""`vnca texture train STYLE --out RUN`."""
+"""`vnca texture train STYLE --out RUN`, and `vnca texture train --resume RUN`."""
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,27 +9,36 @@ from typing import Annotated, Any, Literal
 import torch
 import tyro
 
-from vnca.automaton.model import Model
-from vnca.cli.options import chosen, parse, say
-from vnca.cli.progress import Progress
+from vnca.cli.options import chosen, is_given, parse
+from vnca.cli.session import (
+    Session,
+    asked,
+    choose_device,
+    fitting,
+    interrupted,
+    judged_by,
+    run_folder,
+)
 from vnca.cli.texture_block import KIND
-from vnca.cli.train import THUMBNAIL, choose_device
 from vnca.errors import OptionError
 from vnca.features.vgg import VGG16
-from vnca.io.image import fit, read_image, to_srgb8
-from vnca.io.mesh import read_mesh
+from vnca.io.image import read_image
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.orientation import UpAxis
 from vnca.texturing.config import PRESETS, TextureConfig
-from vnca.texturing.loop import TextureTrainer
-from vnca.texturing.preview import preview_sheet
-from vnca.texturing.scene import BlockScene
-from vnca.training.run import RunFolder
-from vnca.typing import FloatArray
+from vnca.texturing.training import texture_trainer
+from vnca.training.checkpoint import Checkpoint, fingerprints
+from vnca.typing import AnyArray
+
+COMMAND = "texture train"
 
 
 @dataclass(frozen=True)
 class TrainTexture:
-    """Learn a solid texture from one picture."""
+    """Learn a solid texture from one picture.
+
+    `vnca texture train --resume RUN` goes on with a training that was interrupted.
+    """
 
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
     """The picture: PNG, JPEG or WebP."""
@@ -54,29 +64,45 @@ class TrainTexture:
             raise OptionError(f"--preview-every {self.preview_every}: at least 1 is needed")
 
 
+@dataclass(frozen=True)
+class ResumeTexture:
+    """Go on with a training that was interrupted, as if it had not been."""
+
+    resume: Path
+    """Folder of the run. All that was asked for when it began holds."""
+    style: Path | None = None
+    """The picture, if it is no longer where it was."""
+    mesh: Path | None = None
+    """The mesh, if it is no longer where it was."""
+
+
 def run(arguments: Sequence[str]) -> None:
-    """Read the options and train."""
+    """Read the options and train, or go on with a training."""
+    if is_given(arguments, "--resume"):
+        resume(parse(COMMAND, ResumeTexture, arguments))
+        return
     preset = chosen(arguments, "--preset", "draft")
     missing: Any = tyro.MISSING
     defaults = TrainTexture(missing, missing, config=PRESETS.get(preset, TextureConfig()))
-    train(parse("texture train", TrainTexture, arguments, default=defaults))
+    train(parse(COMMAND, TrainTexture, arguments, default=defaults))
 
 
-def train(options: TrainTexture) -> Path:
-    """Train as asked and return the folder of the run.
+def train(options: TrainTexture, checkpoint: Checkpoint | None = None) -> Path:
+    """Train as asked, or go on from a checkpoint, and return the path of the run folder.
 
     Raises:
-        VncaError: If an input cannot be used or the run folder cannot be written.
+        VncaError: If an input cannot be used, the run folder cannot be written, training
+            diverges, or memory runs out.
     """
-    run_folder = RunFolder(options.out, overwrite=options.overwrite)
+    folder = run_folder(options.out, overwrite=options.overwrite, checkpoint=checkpoint)
     style = read_image(options.style)
     device = choose_device(options.device)
     mesh = read_mesh(options.mesh, options.up_axis) if options.mesh else None
     config = options.config
     torch.use_deterministic_algorithms(True)
     vgg = VGG16.load(config.features, device)
-    scene = BlockScene(config.block, config.slices, mesh=mesh, device=device)
-    trainer = TextureTrainer(scene, style, config, vgg)
+    with fitting(config, "this block"):
+        trainer = texture_trainer(style, config, vgg, mesh=mesh, device=device)
     training = {
         "kind": KIND,
         "style": options.style.name,
@@ -85,47 +111,42 @@ def train(options: TrainTexture) -> Path:
         "block": config.block,
         "seed": config.seed,
         "device": str(device),
-        "features": vgg.name,
-        "features_origin": vgg.origin,
-        "features_dtype": str(vgg.dtype).removeprefix("torch."),
+        **judged_by(vgg),
     }
-    with run_folder as folder:
-        asked: Any = config  # the folder only asks for its fields
-        folder.start(asked, training)
-        say(
-            f"{len(scene.domain)} cells, {trainer.rule().weight_count} weights, "
-            f"features '{vgg.name}', {device}"
-        )
-        _improve(trainer, options, folder, style, training)
+    session = Session(
+        command=COMMAND,
+        trainer=trainer,
+        folder=folder,
+        style=style,
+        training=training,
+        inputs=fingerprints(style, config, vgg, mesh=_surfaces(mesh)),
+        asked=asked(options),
+        preview_every=options.preview_every,
+    )
+    session.run(checkpoint)
     return options.out
 
 
-def _improve(
-    trainer: TextureTrainer,
-    options: TrainTexture,
-    folder: RunFolder,
-    style: FloatArray,
-    training: dict[str, Any],
-) -> None:
-    """Iterate to the end or to Ctrl-C; either way the folder holds a usable model."""
-    thumbnail = to_srgb8(fit(style, THUMBNAIL, THUMBNAIL))
+def resume(options: ResumeTexture) -> Path:
+    """Go on with a training, if there is something left to do, and return the run folder.
 
-    def keep() -> None:
-        provenance = {**training, "iterations": trainer.iteration}
-        folder.save(Model(trainer.rule(), provenance, thumbnail))
-        folder.preview(preview_sheet(trainer, style), trainer.iteration)
+    Raises:
+        VncaError: If there is no checkpoint, an input changed, or as `train` says.
+    """
+    left = interrupted(COMMAND, TrainTexture, options.resume)
+    if left is not None:
+        begun, checkpoint = left
+        again = dataclasses.replace(
+            begun,
+            out=options.resume,
+            style=options.style or begun.style,
+            mesh=options.mesh or begun.mesh,
+        )
+        train(again, checkpoint)
+    return options.resume
 
-    total = options.config.iterations
-    with Progress("training", total, "iterations") as progress:
-        try:
-            for step in trainer.run():
-                logged: Any = step  # the folder only asks for its fields
-                folder.log(logged, trainer.learning_rate)
-                progress.show(step.iteration, f"loss {step.loss:.2f}")
-                if step.iteration % options.preview_every == 0 or step.iteration == total:
-                    keep()
-        except KeyboardInterrupt:
-            keep()
-            say(f"stopped at iteration {trainer.iteration}; the model so far is in {folder.path}")
-            raise
-    say(f"model: {folder.path}")
+
+def _surfaces(mesh: Mesh | None) -> list[AnyArray]:
+    """What training sees of a mesh."""
+    surfaces = [] if mesh is None else mesh.surfaces
+    return [array for surface in surfaces for array in (surface.points, surface.faces)]

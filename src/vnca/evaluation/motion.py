@@ -22,7 +22,7 @@ from vnca.render.sample import sample
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.roll import Roll
 from vnca.training.config import ViewConfig
-from vnca.training.scene import Scene
+from vnca.training.smoke_scene import SmokeScene, SmokeSight
 from vnca.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.volume import Volume
 
@@ -95,14 +95,14 @@ def measure_motion(
 
     Reference: VNCA table 2 (L_dir and L_mag at a fixed density frame).
     """
-    scene = Scene(smoke, rule)
+    scene = SmokeScene(smoke, rule, ViewConfig(size=size))
     if smoke.velocity is None:
         raise GridError(f"frame {smoke.frame}: it has no velocity to compare motion with")
     config = StylizeConfig(warmup=warmup, seed=seed)
     states = list(_states(rule, smoke, scene.box, config, frames + 1, backend))
     velocity = scene.domain.gather(smoke.velocity, smoke.origin)
     pairs = [
-        _look(scene, before, after, azimuth, size)
+        _look(scene, before, after, azimuth)
         for before, after in pairwise(states)
         for azimuth in AZIMUTHS
     ]
@@ -161,13 +161,11 @@ def _states(
 
 
 @torch.no_grad()
-def _look(
-    scene: Scene, before: FloatArray, after: FloatArray, azimuth: float, size: int
-) -> SeenPair:
-    camera, view = scene.camera(azimuth, ELEVATION), ViewConfig(size=size)
+def _look(scene: SmokeScene, before: FloatArray, after: FloatArray, azimuth: float) -> SeenPair:
+    camera = scene.camera(azimuth, ELEVATION)
     earlier, later = (torch.from_numpy(state) for state in (before, after))
-    target, opacity = scene.motion(earlier, camera, view, size=size)
-    shown = [scene.look(state, camera, view) for state in (earlier, later)]
+    target, opacity = scene.motion(earlier, SmokeSight(camera, offset=0.0), scene.view.size)
+    shown = [scene.look(state, camera) for state in (earlier, later)]
     # The mean colour of the smoke behind it: a silhouette that stands still should not be seen.
     weight = shown[0].opacity.sum().clamp_min(1e-6)
     background = shown[0].colour.sum((0, 1)) / weight
@@ -194,12 +192,12 @@ def _compare(pairs: Sequence[SeenPair], estimator: Estimator) -> tuple[float, fl
     return float(motion.direction), float(motion.magnitude)
 
 
-def _dense(scene: Scene, values: AnyArray) -> FloatArray:
+def _dense(scene: SmokeScene, values: AnyArray) -> FloatArray:
     count = len(scene.domain)
     return scene.domain.scatter(values[:count], scene.domain.box).astype(np.float32)
 
 
-def _inside(scene: Scene) -> BoolArray:
+def _inside(scene: SmokeScene) -> BoolArray:
     return _dense(scene, np.ones((len(scene.domain), 1), np.float32))[..., 0] > 0
 
 

@@ -1,6 +1,7 @@
 """The block a rule for a solid texture is trained on, ready for rollouts and pictures."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -14,16 +15,23 @@ from vnca.texturing.block import block_domain
 from vnca.texturing.config import SliceConfig
 from vnca.texturing.raster import visible
 from vnca.texturing.slices import (
+    DIAGONAL,
+    Angles,
     as_picture,
     axis_angles,
     oblique_angles,
     shown,
     slice_points,
 )
+from vnca.training.scene import Scene
 from vnca.typing import BoolArray, FloatArray
 
 MESH_VIEWS = 24
 """Views of the mesh that training chooses from."""
+PORTRAITS: tuple[Angles, ...] = ((0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (45.0, DIAGONAL))
+"""From the front, the right and above, and across a diagonal, which training never does."""
+SPACING = 0.5
+"""Cells a pixel of a portrait shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +47,26 @@ class MeshView:
     covered: BoolArray
 
 
-class BlockScene:
-    """A block on which states are rolled out and looked at; nothing in it changes.
+class Cut(NamedTuple):
+    """A picture's place in the block: a slice, or a view of the mesh.
 
     Attributes:
-        domain: All cells of the block; it is its own neighbour on every side.
-        neighbours: `[27, n]`.
-        priors: `[n, 7]` zeros: a texture is the same everywhere.
+        points: In cells, `[r, c, 3]`, or `[n, 3]` of the pixels covered.
+        covered: `[r, c]`, the pixels that show the mesh; all of a slice.
     """
+
+    points: Tensor
+    covered: Tensor | None
+
+
+class BlockScene(Scene[list[Cut]]):
+    """A block on which states are rolled out and looked at; nothing in it changes.
+
+    All its cells live; it is its own neighbour on every side. Priors are zero: a texture is the
+    same everywhere. Its rule leaves the density alone: smoke painted with it keeps its shape.
+    """
+
+    paints_density = False
 
     def __init__(
         self,
@@ -67,54 +87,57 @@ class BlockScene:
         Raises:
             OptionError: If the size cannot work.
         """
+        domain = block_domain(size)
+        super().__init__(domain, np.zeros((len(domain), PRIORS), np.float32), device)
         self.slices = slices
-        self.domain = block_domain(size)
-        self.neighbours = torch.from_numpy(self.domain.neighbours).to(device)
-        self.priors = torch.zeros(len(self.domain), PRIORS, device=device)
-        flat = np.ravel_multi_index(tuple(self.domain.cells.T), self.domain.box.shape)
-        self._flat = torch.from_numpy(flat).to(device)
         self.views = mesh_views(mesh, slices.size) if mesh is not None else []
-
-    def seed(self, channels: int) -> Tensor:
-        """The state every rollout starts from, zeros `[n + 1, channels]`."""
-        return torch.from_numpy(self.domain.seed(channels)).to(self.priors.device)
 
     def block(self, state: Tensor) -> Tensor:
         """Linear RGB `[x, y, z, 3]` of a state; differentiable."""
-        colour = srgb_to_linear((state[:-1, COLOUR] + 0.5).clamp(0, 1))
-        shape = self.domain.box.shape
-        return torch.zeros_like(colour).index_copy(0, self._flat, colour).view(*shape, 3)
+        return self.dense(srgb_to_linear((state[:-1, COLOUR] + 0.5).clamp(0, 1)))
+
+    def sight(self, random: np.random.Generator) -> list[Cut]:
+        """Random slices, or views of the mesh."""
+        return [self._cut(random) for _ in range(self.slices.count)]
 
     def pictures(
-        self, state: Tensor, random: np.random.Generator, background: Tensor
+        self, state: Tensor, sight: list[Cut], background: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Random slices of a state, or views of the mesh, differentiable.
+        """The slices and views, as `Scene.pictures` has it."""
+        block, size = self.block(state), self.slices.size
+        colours, opacities = [], []
+        for points, covered in sight:
+            colour, opacity = shown(block, points), block.new_ones(size, size)
+            if covered is not None:
+                colour = background.expand(size, size, 3).index_put((covered,), colour)
+                opacity = covered.to(block.dtype)
+            colours.append(as_picture(colour))
+            opacities.append(opacity)
+        return torch.cat(colours), torch.stack(opacities)
 
-        Returns:
-            sRGB `[b, 3, r, c]` over the background, and opacity `[b, r, c]`.
-        """
+    def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
+        """Slices from the front, the right and above, and across a diagonal."""
         block = self.block(state)
-        seen = [self._seen(block, random, background) for _ in range(self.slices.count)]
-        colours, opacities = zip(*seen, strict=True)
-        return torch.cat([as_picture(colour) for colour in colours]), torch.stack(opacities)
+        middle = np.full(3, len(block) / 2)
+        return [
+            shown(block, slice_points(angles, middle, size=size, spacing=SPACING).to(block.device))
+            .cpu()
+            .numpy()
+            for angles in PORTRAITS
+        ]
 
-    def _seen(
-        self, block: Tensor, random: np.random.Generator, background: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        """Linear RGB `[r, c, 3]` of a slice or a view, and its opacity `[r, c]`."""
-        size = self.slices.size
-        middle = random.uniform(0, len(block), 3)
+    def _cut(self, random: np.random.Generator) -> Cut:
+        device = self.priors.device
+        middle = random.uniform(0, self.domain.box.shape[0], 3)
         if self.views and random.uniform() < self.slices.mesh:
             view = self.views[int(random.integers(len(self.views)))]
-            points = torch.from_numpy(view.points + middle.astype(np.float32)).to(block.device)
-            covered = torch.from_numpy(view.covered).to(block.device)
-            empty = background.expand(size, size, 3)
-            return empty.index_put((covered,), shown(block, points)), covered.to(block.dtype)
+            points = torch.from_numpy(view.points + middle.astype(np.float32))
+            return Cut(points.to(device), torch.from_numpy(view.covered).to(device))
         oblique = random.uniform() < self.slices.oblique
         angles = oblique_angles(random) if oblique else axis_angles(random)
         spacing = self.slices.zoom ** random.uniform(-1, 1)
-        points = slice_points(angles, middle, size=size, spacing=spacing).to(block.device)
-        return shown(block, points), block.new_ones(size, size)
+        points = slice_points(angles, middle, size=self.slices.size, spacing=spacing)
+        return Cut(points.to(device), None)
 
 
 def mesh_views(mesh: Mesh, size: int) -> list[MeshView]:

@@ -7,7 +7,7 @@ import dataclasses
 import hashlib
 import json
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,11 +22,10 @@ import vnca
 from vnca.errors import FileFormatError, OptionError, OutputError
 from vnca.features.vgg import VGG16
 from vnca.files import existing_file, whole_file
-from vnca.training.config import TrainConfig
+from vnca.training.course import CourseConfig
 from vnca.training.loop import Trainer
 from vnca.training.snapshot import Snapshot
 from vnca.typing import AnyArray, FloatArray
-from vnca.volume import Volume
 
 CHECKPOINT_NAME = "checkpoint.safetensors"
 """Name of the checkpoint in a run folder."""
@@ -42,12 +41,14 @@ class Checkpoint:
     Attributes:
         training: What `Trainer.snapshot` gave.
         inputs: What `fingerprints` gave.
+        command: The command that began it.
         options: What was asked for, to ask for it again; JSON values.
         version: The `vnca` that wrote the file.
     """
 
     training: Mapping[str, Snapshot]
     inputs: Mapping[str, str]
+    command: str
     options: Mapping[str, Any]
     version: str = vnca.__version__
 
@@ -66,6 +67,7 @@ class Checkpoint:
             "format_version": FORMAT_VERSION,
             "version": self.version,
             "inputs": self.inputs,
+            "command": self.command,
             "options": self.options,
             "values": {part: snapshot.values for part, snapshot in self.training.items()},
         }
@@ -100,6 +102,7 @@ class Checkpoint:
                     for part, values in described["values"].items()
                 },
                 inputs=dict(described["inputs"]),
+                command=str(described["command"]),
                 options=dict(described["options"]),
                 version=str(described["version"]),
             )
@@ -139,15 +142,18 @@ def _of_part(tensors: Mapping[str, Tensor], part: str) -> dict[str, Tensor]:
 
 
 def fingerprints(
-    smoke: Volume, style: FloatArray, config: TrainConfig, vgg: VGG16
+    style: FloatArray,
+    config: CourseConfig,
+    vgg: VGG16,
+    **others: Sequence[AnyArray | tuple[int, ...]],
 ) -> dict[str, str]:
-    """What tells each input of a training from another, wherever its file lies."""
+    """What tells each input of a training from another, wherever its file lies.
+
+    `others` are the arrays of all other inputs, by what they are.
+    """
     options = {k: v for k, v in dataclasses.asdict(config).items() if k != "features"}
-    frame = [smoke.density, smoke.origin]
-    if smoke.velocity is not None:
-        frame.append(smoke.velocity)
     return {
-        "frame": _digest(*frame),
+        **{name: _digest(*arrays) for name, arrays in others.items()},
         "style picture": _digest(style),
         "options": hashlib.sha256(json.dumps(options).encode()).hexdigest(),
         "weights of VGG16": vgg.origin,

@@ -1,38 +1,33 @@
 """Training: roll a state out, look at it, compare it with the style, improve the rule.
 
-Reference: VNCA section 3.4.
+Reference: VNCA sections 3.4 and 5.
 """
 
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from vnca.automaton.rule import DENSITY_CHANGE, Rule, Scales
-from vnca.camera import Camera
+from vnca.automaton.rule import DENSITY_CHANGE, Rule
 from vnca.errors import DivergenceError
-from vnca.features.flow import FlowNetwork
 from vnca.features.vgg import VGG16
 from vnca.kernels.update.backend import torch_step
 from vnca.kernels.update.mask import changing_rows
 from vnca.kernels.update.reference import Weights
 from vnca.kernels.update.stencil import stencil
 from vnca.losses.appearance import AppearanceLoss
-from vnca.losses.motion import Motion
 from vnca.losses.overflow import overflow
-from vnca.render.brightness import gamma_for_cell_opacity
-from vnca.render.colour import linear_to_srgb
-from vnca.training.config import TrainConfig
+from vnca.training.course import CourseConfig
 from vnca.training.descent import MOST_RETREATS, Descent
 from vnca.training.motion import MotionSupervision
 from vnca.training.pool import Pool
-from vnca.training.scene import Scene, density_scale, velocity_scale
+from vnca.training.scene import Scene
 from vnca.training.snapshot import Snapshot, count
 from vnca.typing import FloatArray
-from vnca.volume import Volume
 
 
 @dataclass(frozen=True)
@@ -55,13 +50,13 @@ class Progress:
 
 
 class Trainer:
-    """A rule in training on one frame and one style picture.
+    """A rule in training on one scene and one style picture.
 
     Every random choice comes from `config.seed`: same seed, same machine, same rule.
 
     Attributes:
         config: The hyperparameters.
-        scene: The frame.
+        scene: What is trained on.
         step: What computes the automaton, called as `vnca.kernels.update.reference.update` is;
             another that does the same may take its place.
         iteration: Iterations done.
@@ -69,53 +64,56 @@ class Trainer:
 
     def __init__(
         self,
-        smoke: Volume,
+        scene: Scene[Any],
+        rule: Rule,
         style: FloatArray,
-        config: TrainConfig,
+        config: CourseConfig,
         vgg: VGG16,
         *,
-        device: torch.device | str = "cpu",
+        motion: MotionSupervision | None = None,
     ) -> None:
         """Prepare training.
 
         Args:
-            smoke: The frame.
+            scene: What is trained on; its device is where is computed.
+            rule: The rule to begin with.
             style: Linear RGB `[r, c, 3]`.
             config: The hyperparameters.
             vgg: The frozen network that judges pictures.
-            device: Where to compute.
-
-        Raises:
-            GridError: If there is no smoke in the frame.
+            motion: What judges how they move, if anything does.
         """
-        self.config = config
+        self.config, self.scene = config, scene
         self.iteration = 0
-        rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
+        device = scene.priors.device
         self._rule = rule
-        self.scene = Scene(smoke, rule, device=device)
         self._weights = Weights(
             *(
                 torch.tensor(w, device=device, requires_grad=True)
                 for w in (rule.hidden, rule.bias, rule.output)
             )
         )
-        self.step = torch_step(config.backend, device=torch.device(device).type)
+        if not scene.paints_density:
+            self._weights.output.register_hook(_without_density)
+        self.step = torch_step(config.backend, device=device.type)
         self._stencil = torch.from_numpy(
             stencil(
                 sobel_divisor=config.rule.sobel_divisor,
                 laplacian_divisor=config.rule.laplacian_divisor,
             )
         ).to(device)
-        self._appearance = AppearanceLoss(vgg, style, config.appearance, config.view.size)
+        self._appearance = AppearanceLoss(vgg, style, config.appearance, config.pictures.size)
+        self._motion = motion
         self._random = np.random.default_rng(config.seed)
         self._generator = torch.Generator().manual_seed(config.seed)
-        self._pool = Pool(self.scene.seed(config.rule.channels), config.pool, self._random)
+        self._pool = Pool(scene.seed(config.rule.channels), config.pool, self._random)
         self._descent = Descent(self._weights)
-        self._motion = None
-        if config.motion.weight and self.scene.moves:
-            self._motion = MotionSupervision(config.motion, FlowNetwork.load(device))
         self._steps = 0  # of all rollouts: no two share a mask
         self._before: dict[str, Snapshot] | None = None  # the iteration that is under way
+
+    @property
+    def teaches_motion(self) -> bool:
+        """Whether the rule learns to move as the smoke does."""
+        return self._motion is not None
 
     @property
     def background(self) -> Tensor:
@@ -205,14 +203,18 @@ class Trainer:
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
         state = self._roll(before, range(self._steps, self._steps + steps))
         self._steps += steps
-        camera, offset = self._random_viewpoint()
-        picture, opacity = self._picture(state, camera, offset)
-        appearance = self._appearance(picture, opacity, self._generator)
+        sight = self.scene.sight(self._random)
+        pictures, opacity = self.scene.pictures(state, sight, self.background)
+        appearance = self._appearance(pictures, opacity, self._generator)
         others = {"overflow": config.overflow * self._overflow(state[:-1])}
         if self._motion is not None and before.any():  # a state of zeros has no texture to move
-            others["motion"] = self._motion.weighted(
-                self._seen_motion(before, picture, camera, offset, steps),
-                float(appearance.total.detach()),
+            others["motion"] = self._motion.loss(
+                before,
+                pictures,
+                sight,
+                self.background,
+                frames=steps / config.rule.steps_per_frame,
+                appearance=float(appearance.total.detach()),
             )
         loss = appearance.total + torch.stack([*others.values()]).sum()
         kept = self._pool.put(place, state)
@@ -228,7 +230,7 @@ class Trainer:
         )
 
     def grow(self, steps: int) -> Tensor:
-        """A state grown from the seed, as stylizing does; no random stream moves."""
+        """A state grown from the seed, as painting does; no random stream moves."""
         with torch.no_grad():
             return self._roll(self.scene.seed(self.config.rule.channels), range(steps))
 
@@ -256,43 +258,14 @@ class Trainer:
         hidden, bias, output = (w.detach().cpu().numpy().copy() for w in self._weights)
         return dataclasses.replace(self._rule, hidden=hidden, bias=bias, output=output)
 
-    def _random_viewpoint(self) -> tuple[Camera, float]:
-        """A camera anywhere around the smoke, and where along the rays sampling begins."""
-        view = self.config.view
-        azimuth = self._random.uniform(0, 360)
-        elevation = self._random.uniform(-view.elevation, view.elevation)
-        # Samples at random depths: no pattern can hide between them.
-        offset = float(self._random.uniform()) if view.mode == "sane" else 0.0
-        return self.scene.camera(azimuth, elevation), offset
-
-    def _picture(self, state: Tensor, camera: Camera, offset: float) -> tuple[Tensor, Tensor]:
-        """As the losses want it: sRGB `[1, 3, r, c]` and opacity `[1, r, c]`."""
-        view = self.scene.look(state, camera, self.config.view, offset=offset)
-        picture = linear_to_srgb(view.over(self.background))
-        return picture.permute(2, 0, 1)[None], view.opacity[None]
-
-    def _seen_motion(
-        self, before: Tensor, picture: Tensor, camera: Camera, offset: float, steps: int
-    ) -> Motion:
-        """How the texture moved in a rollout, against how the smoke moves in that time."""
-        assert self._motion is not None
-        view, size = self.config.view, min(self.config.motion.size, self.config.view.size)
-        with torch.no_grad():
-            earlier, _ = self._picture(before, camera, offset)
-        target, opacity = self.scene.motion(before, camera, view, size=size, offset=offset)
-        frames = steps / self.config.rule.steps_per_frame
-        return self._motion.compare(earlier, picture, target, opacity, frames=frames)
-
     @staticmethod
     def _overflow(cells: Tensor) -> Tensor:
         """States beyond ±1, and beyond ±½ where they are shown: a clamped colour learns nothing."""
         return overflow(cells) + overflow(2 * cells[:, : DENSITY_CHANGE + 1])
 
 
-def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:
-    """Normalisers from the frame a rule is trained on."""
-    density = density_scale(smoke.density)
-    gamma = config.view.gamma or gamma_for_cell_opacity(
-        smoke.density / density, config.view.cell_opacity
-    )
-    return Scales(density=density, velocity=velocity_scale(smoke), gamma=gamma)
+def _without_density(gradient: Tensor) -> Tensor:
+    """The gradient of W2 that leaves those of its weights that change the density as they are."""
+    gradient = gradient.clone()
+    gradient[DENSITY_CHANGE] = 0
+    return gradient

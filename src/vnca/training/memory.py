@@ -1,6 +1,6 @@
 """How much memory training takes, for when there is not so much."""
 
-from vnca.training.config import TrainConfig
+from vnca.training.course import CourseConfig
 
 VIEW_BYTES = 7000
 """A pixel of a view with all that is computed from it. Measured at 128² to 256² pixels, 24³ cells:
@@ -18,7 +18,7 @@ def is_out_of_memory(error: BaseException) -> bool:
     )
 
 
-def memory_needs(cells: int, config: TrainConfig) -> dict[str, int]:
+def memory_needs(cells: int, config: CourseConfig) -> dict[str, int]:
     """About how many bytes training takes, beside torch and the frame, by the option that rules it.
 
     Args:
@@ -29,21 +29,23 @@ def memory_needs(cells: int, config: TrainConfig) -> dict[str, int]:
     return {
         "pool.size": config.pool.size * state,
         "longest-rollout": config.longest_rollout * state,
-        "view.size": config.view.size**2 * VIEW_BYTES,
+        config.pictures.option: config.pictures.count * config.pictures.size**2 * VIEW_BYTES,
     }
 
 
-def memory_advice(cells: int, config: TrainConfig) -> str:
+def memory_advice(cells: int, config: CourseConfig) -> str:
     """What takes how much memory, and what would take less, in one line."""
     needs = memory_needs(cells, config)
+    seen = config.pictures
     values = {
         "pool.size": config.pool.size,
         "longest-rollout": config.longest_rollout,
-        "view.size": config.view.size,
+        seen.option: seen.size,
     }
     largest = max(needs, key=lambda option: needs[option])
-    lower = max(values[largest] // 2, {"view.size": 32}.get(largest, 1))
-    less = needs[largest] * (1 - (lower / values[largest]) ** (2 if largest == "view.size" else 1))
+    least, power = (32, 2) if largest == seen.option else (1, 1)
+    lower = max(values[largest] // 2, least)
+    less = needs[largest] * (1 - (lower / values[largest]) ** power)
     taken = ", ".join(
         f"--{option} {values[option]} about {_size(bytes_)}" for option, bytes_ in needs.items()
     )

@@ -16,6 +16,7 @@ from torch import Tensor
 from vnca.features.flow import FlowNetwork
 from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss, supervised
 from vnca.losses.pixels import luminance
+from vnca.training.smoke_scene import SmokeScene, SmokeSight
 from vnca.training.snapshot import Snapshot
 
 
@@ -27,11 +28,39 @@ class MotionSupervision:
         appearance: The latest appearance losses, on which the weight of motion is balanced.
     """
 
-    def __init__(self, config: MotionConfig, network: FlowNetwork) -> None:
-        """Prepare; `network` is frozen."""
+    def __init__(self, config: MotionConfig, network: FlowNetwork, scene: SmokeScene) -> None:
+        """Prepare; `network` is frozen, `scene` says how its smoke moves."""
         self.config = config
         self.appearance: deque[float] = deque(maxlen=config.balance_over)
         self._network = network
+        self._scene = scene
+
+    def loss(
+        self,
+        before: Tensor,
+        after: Tensor,
+        sight: SmokeSight,
+        background: Tensor,
+        *,
+        frames: float,
+        appearance: float,
+    ) -> Tensor:
+        """How the texture moved in a rollout, against how the smoke moves in that time, weighted.
+
+        Args:
+            before: The state at its start, `[n + 1, C]`.
+            after: The picture of its end, sRGB `[1, 3, r, c]`; differentiable.
+            sight: Where the picture was taken from.
+            background: What is behind, linear RGB `[3]`.
+            frames: Frames that pass in the rollout, n / N.
+            appearance: The appearance loss of this iteration.
+        """
+        with torch.no_grad():
+            earlier, _ = self._scene.pictures(before, sight, background)
+        size = min(self.config.size, after.shape[-1])
+        target, opacity = self._scene.motion(before, sight, size)
+        motion = self.compare(earlier, after, target, opacity, frames=frames)
+        return self.weighted(motion, appearance)
 
     def compare(
         self,

@@ -15,7 +15,7 @@ from vnca.errors import OutputError
 from vnca.files import remove_file, remove_leftovers, whole_file, writable_folder
 from vnca.io.image import write_image
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, Thrift
-from vnca.training.config import TrainConfig
+from vnca.training.course import CourseConfig
 from vnca.training.curves import PATTERN, Curves
 from vnca.training.loop import Progress
 from vnca.typing import FloatArray
@@ -81,7 +81,7 @@ class RunFolder:
         """End the loss curves."""
         self._curves.close()
 
-    def start(self, config: TrainConfig, training: dict[str, Any]) -> None:
+    def start(self, config: CourseConfig, training: dict[str, Any]) -> None:
         """Write what was asked for: resolved configuration, inputs, version and device."""
         previews = map(_PREVIEW.format, range(config.iterations + 1))
         remove_leftovers(self.path, {CONFIG_NAME, CHECKPOINT_NAME, MODEL_NAME, *previews})

@@ -7,15 +7,15 @@ import torch
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import GridError
 from vnca.training.config import TrainConfig, ViewConfig
-from vnca.training.loop import choose_scales
-from vnca.training.scene import Scene, density_scale, smoke_bounds, velocity_scale
+from vnca.training.smoke import choose_scales
+from vnca.training.smoke_scene import SmokeScene, density_scale, smoke_bounds, velocity_scale
 from vnca.typing import Box
 from vnca.volume import Volume
 
 
-def scene(smoke: Volume, **scales: float) -> Scene:
+def scene(smoke: Volume, **scales: float) -> SmokeScene:
     rule = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(**scales), seed=0)
-    return Scene(smoke, rule)
+    return SmokeScene(smoke, rule, ViewConfig(size=32))
 
 
 def test_the_density_that_counts_as_one_ignores_empty_cells_and_a_few_bright_ones() -> None:
@@ -63,7 +63,7 @@ def test_a_frame_without_smoke_cannot_be_trained_on(tiny_smoke: Volume) -> None:
 
 def test_a_state_of_zeros_looks_grey_and_as_dense_as_the_smoke(tiny_smoke: Volume) -> None:
     there = scene(tiny_smoke, gamma=0.6)
-    view = there.look(there.seed(4), there.camera(30, 10), ViewConfig(size=32))
+    view = there.look(there.seed(4), there.camera(30, 10))
     seen = view.opacity > 0.5
     assert 0.3 < float(seen.float().mean()) < 0.9
     grey = (view.colour / view.opacity[..., None])[seen]
@@ -77,7 +77,7 @@ def test_the_painting_shows_from_where_it_is_on_the_smoke(tiny_smoke: Volume) ->
     is_left = torch.from_numpy(there.domain.cells[:, 0] < 3)
     state[:-1, 0] = torch.where(is_left, 0.5, -0.5)
     for azimuth, red_side in ((0, 0), (180, 1)):
-        view = there.look(state, there.camera(azimuth, 0), ViewConfig(size=32))
+        view = there.look(state, there.camera(azimuth, 0))
         halves = view.colour[..., 0].split(16, dim=1)
         assert halves[red_side].mean() > 10 * halves[1 - red_side].mean()
 
@@ -85,7 +85,7 @@ def test_the_painting_shows_from_where_it_is_on_the_smoke(tiny_smoke: Volume) ->
 def test_a_look_is_differentiable_in_what_is_shown_only(tiny_smoke: Volume) -> None:
     there = scene(tiny_smoke, gamma=0.5)
     state = there.seed(6).requires_grad_()
-    view = there.look(state, there.camera(0, 0), ViewConfig(size=32))
+    view = there.look(state, there.camera(0, 0))
     view.over([0.1, 0.2, 0.3]).sum().backward()
     assert state.grad is not None
     moved = state.grad.abs().sum(0)

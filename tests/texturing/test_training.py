@@ -7,32 +7,33 @@ import torch
 
 from vnca.automaton.rule import DENSITY_CHANGE
 from vnca.features.vgg import VGG16
-from vnca.texturing.config import PoolConfig, TextureConfig
-from vnca.texturing.loop import TextureTrainer
-from vnca.texturing.preview import preview_sheet
-from vnca.texturing.scene import BlockScene
+from vnca.texturing.config import TextureConfig
+from vnca.texturing.training import texture_trainer
+from vnca.training.course import PoolConfig
+from vnca.training.loop import Trainer
+from vnca.training.preview import preview_sheet
 from vnca.typing import FloatArray
 
-Make = Callable[..., TextureTrainer]
+Make = Callable[..., Trainer]
 
 
 @pytest.fixture
 def trainer(style: FloatArray, tiny_config: TextureConfig, vgg: VGG16) -> Make:
     """Makes a trainer of the tiny training with some options changed."""
 
-    def make(**options: object) -> TextureTrainer:
+    def make(**options: object) -> Trainer:
         config = replace(tiny_config, **options)  # type: ignore[arg-type]
-        return TextureTrainer(BlockScene(config.block, config.slices), style, config, vgg)
+        return texture_trainer(style, config, vgg)
 
     return make
 
 
-def weights(trainer: TextureTrainer) -> list[FloatArray]:
+def weights(trainer: Trainer) -> list[FloatArray]:
     rule = trainer.rule()
     return [rule.hidden, rule.bias, rule.output]
 
 
-def same(a: TextureTrainer, b: TextureTrainer) -> bool:
+def same(a: Trainer, b: Trainer) -> bool:
     return all(map(np.array_equal, weights(a), weights(b)))
 
 
@@ -87,7 +88,7 @@ def test_exploded_states_are_told_and_do_not_stay(trainer: Make) -> None:
     )
     steps = list(training.run())
     assert any(step.exploded for step in steps)
-    assert all(state.abs().max() <= 2 for state in training._pool.values())
+    assert all(state.abs().max() <= 2 for state in training._pool._states.values())
     assert all(np.isfinite(w).all() for w in weights(training))
 
 

@@ -1,0 +1,271 @@
+"""A training on the command line, whatever it is trained on: its course, and going on with it."""
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from traceback import clear_frames
+from typing import Any, TypeVar
+
+import torch
+
+from vnca.automaton.model import MODEL_NAME, Model
+from vnca.cli.options import say
+from vnca.cli.progress import Progress
+from vnca.cli.recorded import recorded, restored
+from vnca.errors import (
+    DivergenceError,
+    FileFormatError,
+    OptionError,
+    OutOfMemoryError,
+    VncaError,
+)
+from vnca.features.vgg import VGG16
+from vnca.io.image import resize, to_srgb8
+from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
+from vnca.training.course import CourseConfig
+from vnca.training.loop import Trainer
+from vnca.training.memory import is_out_of_memory, memory_advice
+from vnca.training.preview import preview_sheet
+from vnca.training.run import RunFolder
+from vnca.typing import FloatArray
+
+THUMBNAIL = 96
+"""Rows and columns of the style picture kept in a model file."""
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Session:
+    """A trainer, and what it leaves in the folder of its run.
+
+    Attributes:
+        command: What is called to begin or to go on, without `vnca`.
+        trainer: What is trained.
+        folder: Where it leaves what it leaves.
+        style: The picture, linear RGB `[r, c, 3]`.
+        training: What the model file tells of where it comes from.
+        inputs: What `fingerprints` gave.
+        asked: What was asked for, as JSON values.
+        preview_every: Iterations between preview pictures.
+    """
+
+    command: str
+    trainer: Trainer
+    folder: RunFolder
+    style: FloatArray
+    training: dict[str, Any]
+    inputs: Mapping[str, str]
+    asked: Mapping[str, Any]
+    preview_every: int
+
+    def run(self, checkpoint: Checkpoint | None, *notes: str) -> None:
+        """Train from the beginning or from a checkpoint on, to the end or to Ctrl-C.
+
+        Whichever it is, the folder holds a usable model. `notes` are told first.
+
+        Raises:
+            VncaError: If the checkpoint does not fit, the folder cannot be written, training
+                diverges, or memory runs out.
+        """
+        trainer = self.trainer
+        if checkpoint is not None:
+            checkpoint.resume(trainer, self.inputs, self.folder.path / CHECKPOINT_NAME)
+        with self.folder:
+            if checkpoint is None:
+                self._keep()
+            self.folder.start(trainer.config, self.training)
+            say(
+                f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
+                f"features '{self.training['features']}', {self.training['device']}"
+            )
+            for note in notes:
+                say(note)
+            self._improve()
+
+    def _improve(self) -> None:
+        trainer, folder, total = self.trainer, self.folder, self.trainer.config.iterations
+        progress = Progress("training", total, "iterations", already=trainer.iteration)
+        try:
+            with progress:
+                for step in trainer.run():
+                    folder.log(step, trainer.learning_rate)
+                    progress.show(step.iteration, f"loss {step.loss:.2f}")
+                    if step.diverged:
+                        say(self._setback())
+                    if step.iteration % self.preview_every == 0 and step.iteration < total:
+                        self._show()
+                    if folder.is_keeping_due:
+                        self._keep()
+        except KeyboardInterrupt:
+            trainer.undo()
+            self._keep()
+            self._show()
+            say(
+                f"stopped at iteration {trainer.iteration}; the model so far is in {folder.path}; "
+                f"to go on: {self._call}"
+            )
+            raise
+        except DivergenceError:  # which would come again
+            self._save()
+            folder.finish()
+            raise
+        except (MemoryError, RuntimeError) as error:
+            if not is_out_of_memory(error):
+                raise
+            clear_frames(error.__traceback__)  # They hold on to what was computed.
+            trainer.undo()
+            self._keep()
+            self._save()
+            advice = memory_advice(len(trainer.scene.domain), trainer.config)
+            raise OutOfMemoryError(
+                f"out of memory in iteration {trainer.iteration + 1}: {advice}; to go on from here "
+                f"when more is free: {self._call}"
+            ) from None
+        self._show()
+        folder.finish()
+        say(f"model: {folder.path}")
+
+    @property
+    def _call(self) -> str:
+        return f"vnca {self.command} --resume {self.folder.path}"
+
+    def _keep(self) -> None:
+        """Write a checkpoint."""
+        snapshot = self.trainer.snapshot()
+        self.folder.keep(Checkpoint(snapshot, self.inputs, self.command, self.asked))
+
+    def _show(self) -> None:
+        """Write the model and a preview."""
+        self._save()
+        self.folder.preview(preview_sheet(self.trainer, self.style), self.trainer.iteration)
+
+    def _save(self) -> None:
+        """Write the model."""
+        provenance = {**self.training, "iterations": self.trainer.iteration}
+        self.folder.save(Model(self.trainer.rule(), provenance, _small(self.style)))
+
+    def _setback(self) -> str:
+        trainer = self.trainer
+        return (
+            f"training diverged at iteration {trainer.iteration}: back to the weights of iteration "
+            f"{trainer.good_iteration}, at half the learning rate"
+        )
+
+
+def interrupted(command: str, kind: type[T], folder: Path) -> tuple[T, Checkpoint] | None:
+    """What was asked of an interrupted training, and where it was left; None if it has ended.
+
+    Args:
+        command: The command that goes on, without `vnca`.
+        kind: The options it begins with.
+        folder: The folder of the run.
+
+    Raises:
+        FileFormatError: If there is no training to go on with, or it is another command's.
+    """
+    path = folder / CHECKPOINT_NAME
+    if not path.exists():
+        if not (folder / MODEL_NAME).exists():
+            raise FileFormatError(
+                f"{folder}: no training to go on with here (no {CHECKPOINT_NAME}); "
+                f"begin one with vnca {command}"
+            )
+        say(f"{folder}: this training has come to its end; there is nothing left to do")
+        return None
+    checkpoint = Checkpoint.load(path)
+    if checkpoint.command != command:
+        raise FileFormatError(
+            f"{path}: was written by vnca {checkpoint.command}; go on with "
+            f"vnca {checkpoint.command} --resume {folder}"
+        )
+    try:
+        return restored(kind, checkpoint.options), checkpoint
+    except (KeyError, TypeError, ValueError, VncaError) as error:
+        raise FileFormatError(
+            f"{path}: vnca {checkpoint.version} wrote this checkpoint with other options than "
+            f"this one has, or it is damaged ({error})"
+        ) from error
+
+
+def run_folder(path: Path, *, overwrite: bool, checkpoint: Checkpoint | None) -> RunFolder:
+    """The folder of a new training, or of one that goes on.
+
+    Raises:
+        OutputError: If it cannot be written, or holds a run that may not be replaced.
+        FileFormatError: If the checkpoint is damaged.
+    """
+    if checkpoint is None:
+        return RunFolder(path, overwrite=overwrite)
+    try:
+        iteration = int(checkpoint.training["trainer"].values["iteration"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileFormatError(
+            f"{path / CHECKPOINT_NAME}: the checkpoint is damaged ({error})"
+        ) from error
+    return RunFolder(path, resumed_from=iteration)
+
+
+def asked(options: Any) -> dict[str, Any]:
+    """The options of a training as JSON, with paths that hold from any folder."""
+    config: CourseConfig = options.config
+    if Path(config.features).suffix:  # else a name
+        config = dataclasses.replace(config, features=str(Path(config.features).absolute()))
+    given = {field.name: getattr(options, field.name) for field in dataclasses.fields(options)}
+    paths = {name: value.absolute() for name, value in given.items() if isinstance(value, Path)}
+    return recorded(dataclasses.replace(options, **paths, config=config))
+
+
+def judged_by(vgg: VGG16) -> dict[str, Any]:
+    """What a model file tells of the network that judged its pictures."""
+    return {
+        "features": vgg.name,
+        "features_origin": vgg.origin,
+        "features_dtype": str(vgg.dtype).removeprefix("torch."),
+    }
+
+
+@contextmanager
+def fitting(config: CourseConfig, what: str) -> Iterator[None]:
+    """While a trainer is made of `what` is trained on.
+
+    Raises:
+        OutOfMemoryError: If memory runs out, with one line for the user.
+    """
+    try:
+        yield
+    except (MemoryError, RuntimeError) as error:
+        if not is_out_of_memory(error):
+            raise
+        seen = config.pictures
+        raise OutOfMemoryError(
+            f"out of memory before training began, with {what} and pictures of --{seen.option} "
+            f"{seen.size} pixels; lower it, or take a smaller {what.split()[-1]}"
+        ) from error
+
+
+def choose_device(name: str) -> torch.device:
+    """The device of a name; `auto` takes a GPU where there is one.
+
+    Raises:
+        OptionError: If there is no such device.
+    """
+    if name == "auto":
+        name = "cuda" if torch.cuda.is_available() else "cpu"
+    try:
+        device = torch.device(name)
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as error:
+        raise OptionError(f"--device {name}: not available here; use auto or cpu") from error
+    if device.type not in ("cpu", "cuda"):
+        raise OptionError(f"--device {name}: expected auto, cpu or cuda")
+    return device
+
+
+def _small(style: FloatArray) -> Any:
+    rows, columns = style.shape[:2]
+    factor = min(1.0, THUMBNAIL / max(rows, columns))
+    size = max(1, round(rows * factor)), max(1, round(columns * factor))
+    return to_srgb8(resize(style, *size))

@@ -1,0 +1,51 @@
+"""Training of a solid texture: the trainer of a block and a picture.
+
+Reference: VNCA section 5; slices of a solid as in Kopf et al. 2007.
+"""
+
+import dataclasses
+
+import numpy as np
+import torch
+
+from vnca.automaton.rule import Rule, Scales
+from vnca.features.vgg import VGG16
+from vnca.io.mesh import Mesh
+from vnca.texturing.config import TextureConfig
+from vnca.texturing.scene import BlockScene
+from vnca.training.loop import Trainer
+from vnca.typing import FloatArray
+
+
+def texture_trainer(
+    style: FloatArray,
+    config: TextureConfig,
+    vgg: VGG16,
+    *,
+    mesh: Mesh | None = None,
+    device: torch.device | str = "cpu",
+) -> Trainer:
+    """What trains a rule to grow blocks that look like a picture wherever they are cut.
+
+    Args:
+        style: Linear RGB `[r, c, 3]`.
+        config: The hyperparameters.
+        vgg: The frozen network that judges pictures.
+        mesh: Looked at beside the slices.
+        device: Where to compute.
+    """
+    scene = BlockScene(config.block, config.slices, mesh=mesh, device=device)
+    return Trainer(scene, initial_rule(config), style, config, vgg)
+
+
+def initial_rule(config: TextureConfig) -> Rule:
+    """A rule before training, with random biases.
+
+    Where no prior tells cells anything, a block of zeros is perceived as zeros: without biases
+    the hidden layer would stay silent, and its output weights without a gradient.
+    """
+    rule = Rule.initial(config.rule, Scales(), seed=config.seed)
+    bound = config.rule.inputs**-0.5
+    random = np.random.default_rng(config.seed)
+    bias = random.uniform(-bound, bound, rule.bias.shape).astype(np.float32)
+    return dataclasses.replace(rule, bias=bias)

@@ -1,0 +1,108 @@
+"""What training takes whatever it trains on: the hyperparameters of its course."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from math import inf
+from typing import Annotated, Literal
+
+import tyro
+
+from vnca.automaton.rule import RuleConfig
+from vnca.errors import OptionError
+from vnca.losses.appearance import AppearanceConfig
+
+
+@dataclass(frozen=True)
+class PoolConfig:
+    """The states that rollouts start from."""
+
+    size: int = 64
+    """States kept."""
+    reseed_every: int = 8
+    """Every so many iterations a state is started again from zero."""
+    limit: float = 4.0
+    """A state with a value beyond this has exploded and is thrown away."""
+
+    def __post_init__(self) -> None:
+        if self.size < 1 or self.reseed_every < 1 or not self.limit > 0:
+            raise OptionError("--pool.size, --pool.reseed-every and --pool.limit must be positive")
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """The pictures that are compared with the style in an iteration.
+
+    Attributes:
+        option: What sets their size.
+        size: Rows and columns, pixels.
+        count: How many there are.
+    """
+
+    option: str
+    size: int
+    count: int
+
+
+@dataclass(frozen=True)
+class CourseConfig(ABC):
+    """How a rule is trained, on whatever it is trained."""
+
+    rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = field(default_factory=RuleConfig)
+    appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
+    pool: PoolConfig = field(default_factory=PoolConfig)
+    iterations: int = 400
+    """Iterations of training."""
+    learning_rate: float = 3e-3
+    """Adam's learning rate at its highest."""
+    rate_warmup: int = 15
+    """Iterations over which the learning rate rises to it: a rule that changes states too much at
+    once makes them explode."""
+    milestones: tuple[float, ...] = (0.6, 0.85)
+    """Parts of the iterations after which the learning rate falls."""
+    decay: float = 0.4
+    """What the learning rate is multiplied by at a milestone."""
+    shortest_rollout: int = 8
+    """Fewest steps of the automaton in an iteration."""
+    longest_rollout: int = 24
+    """Most steps of the automaton in an iteration."""
+    overflow: float = 100.0
+    """Weight of the penalty on states beyond ±1."""
+    features: str = "edges"
+    """Weights of VGG16: edges, imagenet or a path."""
+    backend: Literal["auto", "native", "triton", "reference"] = "auto"
+    """What computes the automaton."""
+    seed: int = 0
+    """Same seed, same machine, same result."""
+
+    def __post_init__(self) -> None:
+        if self.iterations < 1:
+            raise OptionError(f"--iterations {self.iterations}: at least 1 is needed")
+        if not (0 < self.learning_rate < inf and 0 < self.decay < inf):
+            raise OptionError("--learning-rate and --decay must be positive")
+        if self.rate_warmup < 0:
+            raise OptionError(f"--rate-warmup {self.rate_warmup}: must not be negative")
+        if not all(0 <= part <= 1 for part in self.milestones):
+            raise OptionError(
+                f"--milestones {' '.join(map(str, self.milestones))}: expected parts of the "
+                "iterations, from 0 to 1"
+            )
+        if not 1 <= self.shortest_rollout <= self.longest_rollout:
+            raise OptionError(
+                f"--shortest-rollout {self.shortest_rollout}: must be from 1 to "
+                f"--longest-rollout ({self.longest_rollout})"
+            )
+        if not 0 <= self.overflow < inf:
+            raise OptionError(f"--overflow {self.overflow}: must not be negative")
+        if not 0 <= self.seed < 2**63:
+            raise OptionError(f"--seed {self.seed}: must be from 0 to 2^63 - 1")
+
+    @property
+    @abstractmethod
+    def pictures(self) -> Pictures:
+        """What is looked at in an iteration."""
+
+    def rate(self, iteration: int) -> float:
+        """Learning rate of an iteration, counted from 0: a ramp, then a step at each milestone."""
+        ramp = min(1.0, (iteration + 1) / (self.rate_warmup + 1))
+        passed = sum(iteration >= round(part * self.iterations) for part in self.milestones)
+        return self.learning_rate * ramp * self.decay**passed

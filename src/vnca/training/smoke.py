@@ -1,0 +1,51 @@
+"""Training on smoke: the trainer of a frame and a picture."""
+
+import torch
+
+from vnca.automaton.rule import Rule, Scales
+from vnca.features.flow import FlowNetwork
+from vnca.features.vgg import VGG16
+from vnca.render.brightness import gamma_for_cell_opacity
+from vnca.training.config import TrainConfig
+from vnca.training.loop import Trainer
+from vnca.training.motion import MotionSupervision
+from vnca.training.smoke_scene import SmokeScene, density_scale, velocity_scale
+from vnca.typing import FloatArray
+from vnca.volume import Volume
+
+
+def smoke_trainer(
+    smoke: Volume,
+    style: FloatArray,
+    config: TrainConfig,
+    vgg: VGG16,
+    *,
+    device: torch.device | str = "cpu",
+) -> Trainer:
+    """What trains a rule on one frame and one picture.
+
+    Args:
+        smoke: The frame.
+        style: Linear RGB `[r, c, 3]`.
+        config: The hyperparameters.
+        vgg: The frozen network that judges pictures.
+        device: Where to compute.
+
+    Raises:
+        GridError: If there is no smoke in the frame.
+    """
+    rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
+    scene = SmokeScene(smoke, rule, config.view, device=device)
+    motion = None
+    if config.motion.weight and scene.moves:
+        motion = MotionSupervision(config.motion, FlowNetwork.load(device), scene)
+    return Trainer(scene, rule, style, config, vgg, motion=motion)
+
+
+def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:
+    """Normalisers from the frame a rule is trained on."""
+    density = density_scale(smoke.density)
+    gamma = config.view.gamma or gamma_for_cell_opacity(
+        smoke.density / density, config.view.cell_opacity
+    )
+    return Scales(density=density, velocity=velocity_scale(smoke), gamma=gamma)

@@ -1,0 +1,197 @@
+"""The one frame a rule is trained on, ready for rollouts and pictures."""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from vnca.automaton.domain import Domain
+from vnca.automaton.priors import priors
+from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
+from vnca.camera import Camera, Orthographic, Perspective, frame_box
+from vnca.errors import GridError
+from vnca.render.colour import linear_to_srgb, srgb_to_linear
+from vnca.render.velocity import projected_velocity
+from vnca.render.view import View, render
+from vnca.training.config import ViewConfig
+from vnca.training.scene import Scene
+from vnca.typing import AnyArray, Box, FloatArray
+from vnca.volume import Volume
+
+PORTRAITS = ((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (30.0, 60.0))
+"""Azimuth and elevation: front, right, back and from above, degrees."""
+PORTRAIT_STEP = 0.5
+"""Distance between samples along a ray, cells: finer than in training, without terraces."""
+PORTRAIT_BACKGROUND = 0.01
+"""Linear grey behind the smoke."""
+
+
+class SmokeSight(NamedTuple):
+    """Where smoke is looked at from.
+
+    Attributes:
+        camera: The camera.
+        offset: Shift of all samples along their rays, in steps.
+    """
+
+    camera: Camera
+    offset: float
+
+
+class SmokeScene(Scene[SmokeSight]):
+    """A frame of smoke on which states are rolled out and looked at; nothing in it changes.
+
+    Attributes:
+        view: How it is looked at.
+        box: The cells that hold smoke lie in it.
+        moves: Whether the smoke has any velocity.
+    """
+
+    def __init__(
+        self,
+        smoke: Volume,
+        rule: Rule,
+        view: ViewConfig,
+        *,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        """Prepare a frame.
+
+        Args:
+            smoke: The frame; must hold smoke.
+            rule: Its normalisers and switches are used, not its weights.
+            view: How it is looked at; gamma is the rule's.
+            device: Where rollouts and pictures are computed.
+
+        Raises:
+            GridError: If there is no smoke in the frame.
+        """
+        self.view = view
+        self.box = smoke_bounds(smoke, rule.scales.density)
+        domain = Domain.around_smoke(
+            smoke.density,
+            smoke.origin,
+            threshold=SMOKE_THRESHOLD * rule.scales.density,
+            reach=rule.config.reach,
+            box=self.box.grown(rule.config.reach),
+        )
+        super().__init__(domain, priors(domain, smoke, rule), device)
+        self.gamma = rule.scales.gamma
+        density = domain.gather(smoke.density, smoke.origin) / rule.scales.density
+        self._density = torch.from_numpy(density.astype(np.float32)).to(device)
+        velocity = np.zeros((len(domain), 3), dtype=np.float32)
+        if smoke.velocity is not None:
+            velocity[:] = domain.gather(smoke.velocity, smoke.origin)
+        self.moves = bool(velocity.any())
+        self._velocity = torch.from_numpy(velocity).to(device)
+
+    def camera(
+        self, azimuth: float, elevation: float, *, aspect: float = 1.0
+    ) -> Orthographic | Perspective:
+        """A camera around the smoke, framed on its bounding box."""
+        lower, upper = (np.asarray(c) - self.domain.box.lower for c in self.box)
+        return frame_box(
+            (lower - 0.5).tolist(), (upper - 0.5).tolist(), azimuth, elevation, aspect=aspect
+        )
+
+    def sight(self, random: np.random.Generator) -> SmokeSight:
+        """A camera anywhere around the smoke, and where along the rays sampling begins."""
+        azimuth = random.uniform(0, 360)
+        elevation = random.uniform(-self.view.elevation, self.view.elevation)
+        # Samples at random depths: no pattern can hide between them.
+        offset = float(random.uniform()) if self.view.mode == "sane" else 0.0
+        return SmokeSight(self.camera(azimuth, elevation), offset)
+
+    def pictures(
+        self, state: Tensor, sight: SmokeSight, background: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """A view, as `Scene.pictures` has it."""
+        view = self.look(state, sight.camera, offset=sight.offset)
+        picture = linear_to_srgb(view.over(background))
+        return picture.permute(2, 0, 1)[None], view.opacity[None]
+
+    def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
+        """Views from the front, the right, the back and above."""
+        view = dataclasses.replace(self.view, size=size)
+        if view.mode == "sane":
+            view = dataclasses.replace(view, step=PORTRAIT_STEP)
+        pictures = []
+        for azimuth, elevation in PORTRAITS:
+            seen = self.look(state, self.camera(azimuth, elevation), view)
+            pictures.append(seen.over([PORTRAIT_BACKGROUND] * 3).clamp(0, 1).cpu().numpy())
+        return pictures
+
+    def look(
+        self, state: Tensor, camera: Camera, view: ViewConfig | None = None, *, offset: float = 0.0
+    ) -> View:
+        """The smoke as `state` paints it; differentiable in the state.
+
+        `view` is that of training unless given; `offset` shifts all samples along their rays.
+        """
+        view = view or self.view
+        colour = srgb_to_linear((state[:-1, COLOUR] + 0.5).clamp(0, 1))
+        return render(
+            self._painted_density(state),
+            self.dense(colour),
+            camera,
+            rows=view.size,
+            columns=view.size,
+            gamma=self.gamma,
+            step=view.step,
+            offset=offset,
+            mode=view.mode,
+        )
+
+    def motion(self, state: Tensor, sight: SmokeSight, size: int) -> tuple[Tensor, Tensor]:
+        """How the smoke that `pictures` shows moves: pixels per frame `[r, c, 2]`, and opacity.
+
+        `size` is that of such a picture, rows and columns.
+        """
+        return projected_velocity(
+            self._painted_density(state),
+            self.dense(self._velocity),
+            sight.camera,
+            rows=size,
+            columns=size,
+            gamma=self.gamma,
+            step=self.view.step,
+            offset=sight.offset,
+            mode=self.view.mode,
+        )
+
+    def _painted_density(self, state: Tensor) -> Tensor:
+        change = state[:-1, DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
+        return self.dense(self._density * (1 + change))
+
+
+def smoke_bounds(smoke: Volume, density_scale: float) -> Box:
+    """The box of the cells that count as smoke.
+
+    Raises:
+        GridError: If there are none.
+    """
+    cells = np.argwhere(smoke.density > SMOKE_THRESHOLD * density_scale)
+    if len(cells) == 0:
+        raise GridError(
+            f"frame {smoke.frame}: there is no smoke in it to train on; choose a later frame"
+        )
+    lower, upper = cells.min(axis=0), cells.max(axis=0) + 1
+    x, y, z = (lower + smoke.origin).tolist()
+    u, v, w = (upper + smoke.origin).tolist()
+    return Box((x, y, z), (u, v, w))
+
+
+def density_scale(density: AnyArray) -> float:
+    """The density that counts as 1: the 99th percentile of what is not empty."""
+    smoke = density[density > 0]
+    return float(np.percentile(smoke, 99)) if len(smoke) else 1.0
+
+
+def velocity_scale(smoke: Volume) -> float:
+    """Cells per frame that count as 1: the root mean square speed inside the smoke."""
+    if smoke.velocity is None:
+        return 1.0
+    speed = np.linalg.norm(smoke.velocity[smoke.density > 0], axis=-1)
+    return max(float(np.sqrt(np.mean(speed**2))), 1e-3) if len(speed) else 1.0
