@@ -138,6 +138,13 @@ def test_the_preset_is_written_down(trained: Run) -> None:
     assert config["config"]["pool"]["size"] == PRESETS["paper"].pool.size
 
 
+def test_views_can_be_chosen(trained: Run) -> None:
+    view = resolved(trained("run", "--view.azimuths", 0, 90, "--view.elevation", 0))["config"][
+        "view"
+    ]
+    assert view["azimuths"] == [0.0, 90.0]
+
+
 def test_interrupted_training_leaves_a_usable_model(
     vnca: Vnca,
     frame: Path,

@@ -22,6 +22,8 @@ from vnca.training.course import PoolConfig
         (TrainConfig, "seed", -1),
         (TrainConfig, "seed", 2**64),
         (ViewConfig, "size", 31),
+        (ViewConfig, "azimuths", (0.0, 361.0)),
+        (ViewConfig, "azimuths", (math.nan,)),
         (ViewConfig, "elevation", 91.0),
         (ViewConfig, "step", math.nan),
         (ViewConfig, "cell_opacity", 1.0),

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +14,9 @@ from vnca.typing import Box
 from vnca.volume import Volume
 
 
-def scene(smoke: Volume, **scales: float) -> SmokeScene:
+def scene(smoke: Volume, view: ViewConfig | None = None, **scales: float) -> SmokeScene:
     rule = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(**scales), seed=0)
-    return SmokeScene(smoke, rule, ViewConfig(size=32))
+    return SmokeScene(smoke, rule, view or ViewConfig(size=32))
 
 
 def test_the_density_that_counts_as_one_ignores_empty_cells_and_a_few_bright_ones() -> None:
@@ -80,6 +81,26 @@ def test_the_painting_shows_from_where_it_is_on_the_smoke(tiny_smoke: Volume) ->
         view = there.look(state, there.camera(azimuth, 0))
         halves = view.colour[..., 0].split(16, dim=1)
         assert halves[red_side].mean() > 10 * halves[1 - red_side].mean()
+
+
+def angles(there: SmokeScene, count: int = 40) -> set[tuple[float, float]]:
+    """Azimuths and elevations that training looks from."""
+    random = np.random.default_rng(0)
+    cameras: list[Any] = [there.sight(random).camera for _ in range(count)]
+    return {(camera.azimuth, camera.elevation) for camera in cameras}
+
+
+def test_training_looks_from_all_around_unless_told_otherwise(tiny_smoke: Volume) -> None:
+    azimuths, elevations = zip(*angles(scene(tiny_smoke, ViewConfig(elevation=20))), strict=True)
+    assert len({azimuth // 90 for azimuth in azimuths}) == 4
+    assert -20 <= min(elevations) < 0 < max(elevations) <= 20
+
+
+def test_training_looks_from_the_azimuths_given_and_no_other(tiny_smoke: Volume) -> None:
+    few = ViewConfig(azimuths=(0, 90, -30), elevation=0)
+    assert angles(scene(tiny_smoke, few)) == {(0, 0), (90, 0), (-30, 0)}
+    single = ViewConfig(azimuths=(45,), elevation=0)
+    assert angles(scene(tiny_smoke, single)) == {(45, 0)}
 
 
 def test_a_look_is_differentiable_in_what_is_shown_only(tiny_smoke: Volume) -> None:

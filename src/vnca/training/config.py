@@ -18,6 +18,8 @@ class ViewConfig:
 
     size: int = 128
     """Rows and columns of a view, pixels."""
+    azimuths: tuple[float, ...] = ()
+    """Views come from these degrees around the smoke; from all around unless given."""
     elevation: float = 30.0
     """Views come from up to this many degrees above or below the horizon."""
     step: float = 1.0
@@ -33,6 +35,10 @@ class ViewConfig:
     def __post_init__(self) -> None:
         if self.size < 32:
             raise OptionError(f"--view.size {self.size}: at least 32 pixels are needed")
+        if not all(-360 <= azimuth <= 360 for azimuth in self.azimuths):
+            raise OptionError(
+                f"--view.azimuths {' '.join(map(str, self.azimuths))}: must be -360 to 360 degrees"
+            )
         if not 0 <= self.elevation <= 90:
             raise OptionError(f"--view.elevation {self.elevation}: must be 0 to 90 degrees")
         if not 0 < self.step < inf:

@@ -97,8 +97,9 @@ class SmokeScene(Scene[SmokeSight]):
         )
 
     def sight(self, random: np.random.Generator) -> SmokeSight:
-        """A camera anywhere around the smoke, and where along the rays sampling begins."""
-        azimuth = random.uniform(0, 360)
+        """A camera around the smoke, and where along the rays sampling begins."""
+        azimuths = self.view.azimuths
+        azimuth = float(random.choice(azimuths)) if azimuths else random.uniform(0, 360)
         elevation = random.uniform(-self.view.elevation, self.view.elevation)
         # Samples at random depths: no pattern can hide between them.
         offset = float(random.uniform()) if self.view.mode == "sane" else 0.0
