@@ -83,6 +83,20 @@ def test_the_painting_shows_from_where_it_is_on_the_smoke(tiny_smoke: Volume) ->
         assert halves[red_side].mean() > 10 * halves[1 - red_side].mean()
 
 
+def test_cells_live_near_the_smoke_or_in_its_whole_box(tiny_smoke: Volume) -> None:
+    seen = []
+    for domain in ("active", "box"):
+        config = RuleConfig(channels=4, hidden=2, domain=domain)  # type: ignore[arg-type]
+        rule = Rule.initial(config, Scales(), seed=0)
+        there = SmokeScene(tiny_smoke, rule, ViewConfig(size=32))
+        is_box = len(there.domain) == np.prod(there.domain.box.shape)
+        assert is_box == (domain == "box")
+        state = there.seed(4)
+        camera = there.camera(0, 0)
+        seen.append(there.look(state, camera).opacity)
+    torch.testing.assert_close(*seen)
+
+
 def angles(there: SmokeScene, count: int = 40) -> set[tuple[float, float]]:
     """Azimuths and elevations that training looks from."""
     random = np.random.default_rng(0)

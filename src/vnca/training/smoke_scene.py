@@ -70,13 +70,17 @@ class SmokeScene(Scene[SmokeSight]):
         """
         self.view = view
         self.box = smoke_bounds(smoke, rule.scales.density)
-        domain = Domain.around_smoke(
-            smoke.density,
-            smoke.origin,
-            threshold=SMOKE_THRESHOLD * rule.scales.density,
-            reach=rule.config.reach,
-            box=self.box.grown(rule.config.reach),
-        )
+        box = self.box.grown(rule.config.reach)
+        if rule.config.domain == "box":
+            domain = Domain.filling(box)
+        else:
+            domain = Domain.around_smoke(
+                smoke.density,
+                smoke.origin,
+                threshold=SMOKE_THRESHOLD * rule.scales.density,
+                reach=rule.config.reach,
+                box=box,
+            )
         super().__init__(domain, priors(domain, smoke, rule), device)
         self.gamma = rule.scales.gamma
         density = domain.gather(smoke.density, smoke.origin) / rule.scales.density
