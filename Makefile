@@ -63,7 +63,7 @@ lock:
 
 bench: setup
 	$(BIN)/python benchmarks/vdb.py
-	$(BIN)/python benchmarks/step.py
+	$(BIN)/vnca bench step
 
 # MSOE=FILE also compares with the published weights, which are not part of the project.
 bench-flow: setup

@@ -32,7 +32,7 @@ from torch.nn import functional
 
 import vnca
 from msoe import published
-from step import device, positive
+from vnca.bench.machine import device_name
 from vnca.camera import frame_box
 from vnca.errors import VncaError
 from vnca.evaluation.estimators import Estimator, dis, estimator_of, farneback
@@ -208,6 +208,12 @@ def fitted(estimator: Estimator) -> tuple[Estimator, float]:
     return lambda before, after: np.float32(factor) * estimator(before, after), factor
 
 
+def positive(text: str) -> int:
+    if int(text) < 1:
+        raise ValueError
+    return int(text)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -222,7 +228,7 @@ def main() -> None:
     torch.set_num_threads(options.threads)
     run = {
         "date": datetime.now(timezone.utc).date().isoformat(),
-        "device": device(),
+        "device": device_name("cpu"),
         "threads": options.threads,
         "torch": torch.__version__,
         "vnca": vnca.__version__,

@@ -11,7 +11,7 @@ import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
-from cases import smoke
+from vnca.bench.cases import smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 from vnca.typing import Box
 

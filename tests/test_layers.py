@@ -14,7 +14,7 @@ RANKS = {
     "io": 2, "automaton": 2, "render": 2, "features": 2, "simulate": 2,
     "losses": 3, "stylize": 3,
     "training": 4,
-    "texturing": 5, "evaluation": 5, "viewer": 5,
+    "texturing": 5, "evaluation": 5, "bench": 5, "viewer": 5,
     "cli": 6,
 }  # fmt: skip
 WITHOUT_TORCH = {

@@ -7,7 +7,6 @@ steps and its gradient, with the memory it takes at most.
 
 import argparse
 import csv
-import sys
 from datetime import datetime, timezone
 from pathlib import Path
 from statistics import median
@@ -17,11 +16,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-sys.path.append(str(Path(__file__).parent.parent))
-
 import vnca
-from cases import PROBABILITY, Case, Place
-from step import DTYPES
+from vnca.bench.cases import PROBABILITY, Case, Place
+from vnca.bench.contenders import DTYPES
 from vnca.kernels.update import triton, triton_mask
 from vnca.kernels.update.reference import Weights
 from vnca.kernels.update.stencil import stencil

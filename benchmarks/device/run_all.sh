@@ -13,7 +13,6 @@ OUT=${OUT:-build/device}
 mkdir -p "$OUT"
 export PYTHONPATH=src PYTHONUNBUFFERED=1
 unset TRITON_INTERPRET
-step=(python3 benchmarks/step.py --device cuda --threads 8 --csv "$OUT/step.csv")
 
 check() {
     nvidia-smi --query-gpu=name,driver_version,memory.total,clocks.sm,clocks.mem --format=csv
@@ -31,15 +30,6 @@ print(f"python {sys.version.split()[0]}, numpy {numpy.__version__}, triton {trit
 print(f"torch {torch.__version__}, CUDA {torch.version.cuda}, {torch.cuda.get_device_name()}")
 print(f"native kernel: {native.unavailable() or 'there'}")
 print(f"auto takes {choose(device='cuda')}")
-source, to = (torch.empty(1 << 30, dtype=torch.uint8, device="cuda") for _ in range(2))
-to.copy_(source)
-begin, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
-begin.record()
-for _ in range(10):
-    to.copy_(source)
-end.record()
-end.synchronize()
-print(f"copy peak {10 * 2 * 2**30 / begin.elapsed_time(end) / 1e6:.0f} GB/s, read and written")
 PYTHON
 }
 
@@ -57,23 +47,9 @@ memcheck() {
         -k "triton and (odd or flat or portions or wraps)"
 }
 
-bench() {
-    "${step[@]}" --grid 64x64x64 --backends plain,compile,reference,triton \
-        --dtypes float32,tf32,float16,bfloat16 || return
-    "${step[@]}" --grid 128x128x128 --backends plain,compile,triton \
-        --dtypes float32,tf32,float16 || return
-    for share in 0.01 0.05 0.15 0.5; do
-        "${step[@]}" --grid 128x128x128 --occupancy "$share" --backends triton \
-            --dtypes tf32,float16 || return
-    done
-}
+bench() { python3 benchmarks/device/step.py bench --csv "$OUT/step.csv"; }
 
-large() {
-    "${step[@]}" --grid 200x300x200 --occupancy 0.15 --backends plain,triton --passes forward \
-        --dtypes tf32,float16 || return
-    "${step[@]}" --grid 200x300x200 --backends plain,compile,triton --passes forward \
-        --dtypes tf32,float16
-}
+large() { python3 benchmarks/device/step.py large --csv "$OUT/step.csv"; }
 
 rollout() { python3 benchmarks/device/rollout.py --csv "$OUT/rollout.csv"; }
 

@@ -5,18 +5,16 @@ Run `python benchmarks/device/sweep.py --csv FILE`. Each is varied alone, from w
 
 import argparse
 import csv
-import sys
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import torch
 from triton.runtime.errors import OutOfResources
 
-sys.path.append(str(Path(__file__).parent.parent))
-
-from cases import Case, Place
-from step import DTYPES, packaged, seconds
+from vnca.bench.cases import Case, Place
+from vnca.bench.contenders import DTYPES, contender
+from vnca.bench.timing import Begin, seconds
 from vnca.kernels.update import triton
 
 CHOICES: dict[str, tuple[Any, ...]] = {
@@ -32,13 +30,13 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 }
 
 
-def milliseconds(work: Callable[[], object]) -> float | None:
+def milliseconds(begin: Begin) -> float | None:
     """The best of several times; nothing if it does not fit into a multiprocessor."""
     try:
-        work()
+        begin()()
     except OutOfResources:
         return None
-    return round(min(seconds(work, "cuda") for _ in range(3)) * 1e3, 4)
+    return round(min(seconds(begin, "cuda") for _ in range(3)) * 1e3, 4)
 
 
 def main() -> None:
@@ -50,12 +48,14 @@ def main() -> None:
     rows = []
     for dtype in ("float16", "tf32", "float32"):
         torch.set_float32_matmul_precision("high" if dtype == "tf32" else "highest")
-        backend = packaged(case, "triton", Place("cuda", DTYPES[dtype]), threads=1)
+        backend = contender(case, "triton", Place("cuda", DTYPES[dtype]), threads=1)
         for name, values in CHOICES.items():
             for value in dict.fromkeys((usual[name], *values)):
                 setattr(triton, name, value)
                 row: dict[str, Any] = {"dtype": dtype, "constant": name, "value": value}
-                row |= {part: milliseconds(getattr(backend, part)) for part in ("forward", "both")}
+                row |= {
+                    part: milliseconds(partial(backend.begin, part)) for part in ("forward", "both")
+                }
                 print(row, flush=True)
                 rows.append(row)
             setattr(triton, name, usual[name])

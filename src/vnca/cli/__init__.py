@@ -18,6 +18,7 @@ COMMANDS = {
     "texture": "grow solid textures and put them on meshes",
     "evaluate": "measure how the texture of a trained rule moves",
     "render": "make a film or a turntable of a sequence",
+    "bench": "time steps, training and painting on this machine",
     "info": "describe a volume file, a model or a training run",
 }
 

@@ -1,4 +1,4 @@
-"""What several benchmarks measure: smoke-shaped cells, and one step of the automaton on them."""
+"""What is measured: smoke-shaped cells, and one step of the automaton on them."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -9,15 +9,16 @@ import torch
 from torch import Tensor
 
 from vnca.automaton.domain import Domain
+from vnca.automaton.rule import PRIORS
 from vnca.kernels.update.mask import changing_rows
 from vnca.kernels.update.stencil import FILTERS
 from vnca.typing import AnyArray, BoolArray, FloatArray, Index, IntArray
 
-CHANNELS, PRIORS, PROBABILITY = 12, 7, 0.5
+CHANNELS, PROBABILITY = 12, 0.5
 
 
 def smoke(shape: tuple[int, int, int], share: float, seed: int = 0) -> tuple[AnyArray, BoolArray]:
-    """A ragged rising column of which `share` of all cells is active."""
+    """A ragged rising column: density, and where there is some, about a `share` of all cells."""
     rng = np.random.default_rng(seed)
     x, y, z = np.meshgrid(*(np.linspace(-1, 1, n, dtype=np.float32) for n in shape), indexing="ij")
     field = -(x**2 + z**2) / (0.35 + 0.25 * y) ** 2
@@ -35,7 +36,16 @@ def smoke(shape: tuple[int, int, int], share: float, seed: int = 0) -> tuple[Any
 
 @dataclass(frozen=True)
 class Case:
-    """One step, the same for every backend, and a gradient of its result."""
+    """One step, the same for every backend, and a gradient of its result.
+
+    Attributes:
+        domain: The cells that live.
+        rows: `[m]` those that change.
+        state: `[n + 1, C]`.
+        priors: `[n, P]`.
+        weights: W1, b1 and W2.
+        gradient: `[n + 1, C]`.
+    """
 
     domain: Domain
     rows: IntArray
@@ -70,6 +80,16 @@ class Case:
             ),
             normal(n + 1, CHANNELS),
         )
+
+    @property
+    def hidden(self) -> int:
+        """Hidden units."""
+        return len(self.weights[1])
+
+    @property
+    def occupancy(self) -> float:
+        """Share of the grid's cells that live."""
+        return len(self.domain) / float(np.prod(self.domain.box.shape))
 
     def rounded(self, dtype: torch.dtype) -> "Case":
         """With values that a dtype can hold: what is compared is arithmetic, not input."""

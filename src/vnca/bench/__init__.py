@@ -1,0 +1,1 @@
+"""What the kernels, training and stylizing cost on the machine at hand."""

@@ -1,0 +1,166 @@
+"""Every backend's step of a case, in the layout that it works in."""
+
+import os
+import shutil
+from collections.abc import Callable
+from functools import partial
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from vnca.automaton.rule import PRIORS
+from vnca.bench.cases import CHANNELS, Case, Place
+from vnca.bench.plain import Grid, depthwise, input_order, plain_step
+from vnca.errors import BackendUnavailableError, OptionError
+from vnca.kernels.update.backend import choose, torch_step
+from vnca.kernels.update.reference import Weights
+from vnca.kernels.update.stencil import stencil
+
+BACKENDS = ("plain", "compile", "reference", "native", "triton")
+"""`compile` is `plain` under `torch.compile`."""
+PASSES = ("forward", "backward", "both")
+DTYPES = {
+    "float32": torch.float32,
+    "tf32": torch.float32,
+    "float16": torch.float16,
+    "bfloat16": torch.bfloat16,
+}
+"""Of states, weights and products; `tf32` is float32 whose products may round to 10 bits."""
+
+
+class Contender(NamedTuple):
+    """A step in a backend's own layout.
+
+    Attributes:
+        step: The new state from the inputs.
+        inputs: State, W1, b1 and W2.
+        gradient: Of the new state.
+        listed: Brings a new state and gradients of the inputs into the layout of a `Case`.
+    """
+
+    step: Callable[..., Tensor]
+    inputs: tuple[Tensor, ...]
+    gradient: Tensor
+    listed: Callable[..., tuple[Tensor, ...]]
+
+    def begin(self, part: str) -> Callable[[], tuple[Tensor, ...]]:
+        """What a pass does, with all done that comes before it."""
+        if part == "backward":
+            return partial(self._gradients, self.step(*self.inputs))
+        return {"forward": self._forward, "both": self._both}[part]
+
+    def _forward(self) -> tuple[Tensor, ...]:
+        with torch.no_grad():
+            return (self.step(*self.inputs),)
+
+    def _gradients(self, result: Tensor) -> tuple[Tensor, ...]:
+        return torch.autograd.grad(result, self.inputs, self.gradient)
+
+    def _both(self) -> tuple[Tensor, ...]:
+        result = self.step(*self.inputs)
+        return result.detach(), *self._gradients(result)
+
+
+def contender(case: Case, name: str, place: Place, *, threads: int) -> Contender:
+    """A backend, ready to take a step.
+
+    Raises:
+        BackendUnavailableError: If it cannot run there.
+    """
+    if name in ("plain", "compile"):
+        return _plain(case, place, compiled=name == "compile")
+    return _packaged(case, name, place, threads=threads)
+
+
+def available(dtype: str, device: str) -> tuple[str, ...]:
+    """The backends that can run with numbers of that type on that kind of device."""
+    return tuple(name for name in BACKENDS if _why_not(name, dtype, device) is None)
+
+
+def require(name: str, dtype: str, device: str) -> None:
+    """Refuse a backend that cannot run.
+
+    Raises:
+        BackendUnavailableError: With the reason.
+        OptionError: If there is none of that name.
+    """
+    if name not in BACKENDS:
+        raise OptionError(f"--backends {name}: expected {', '.join(BACKENDS)}")
+    reason = _why_not(name, dtype, device)
+    if reason is not None:
+        raise BackendUnavailableError(f"--backends {name}: {reason}")
+
+
+def _why_not(name: str, dtype: str, device: str) -> str | None:
+    if name == "plain":
+        return None
+    if name == "compile":
+        if device != "cpu":
+            return None if find_spec("triton") else "torch.compile needs triton on a GPU"
+        compiler = os.environ.get("CXX", "g++")
+        return (
+            None if shutil.which(compiler) else f"torch.compile needs a C++ compiler ({compiler})"
+        )
+    try:
+        choose(name, device=device)
+    except BackendUnavailableError as error:
+        return str(error)
+    if name == "native" and DTYPES[dtype] != torch.float32:
+        return f"the native kernel computes in float32, not in {dtype}"
+    return None
+
+
+def _plain(case: Case, place: Place, *, compiled: bool) -> Contender:
+    domain, grid = case.domain, Grid(case.domain, place.device)
+    changing = torch.zeros(len(domain), 1)
+    changing[torch.from_numpy(case.rows).long()] = 1
+    mask, priors = (grid.spread(place.tensor(t)) for t in (changing, case.priors))
+    filters = depthwise(place.tensor(stencil()), CHANNELS)
+    order = input_order(CHANNELS, PRIORS)
+
+    def step(state: Tensor, hidden: Tensor, bias: Tensor, output: Tensor) -> Tensor:
+        return apply(state, mask, priors, filters, hidden, bias, output)
+
+    def listed(
+        state: Tensor, to_state: Tensor, to_hidden: Tensor, to_bias: Tensor, to_output: Tensor
+    ) -> tuple[Tensor, ...]:
+        back = order.argsort().to(to_hidden.device)
+        return (
+            grid.collect(state),
+            grid.collect(to_state),
+            to_hidden.flatten(1)[:, back],
+            to_bias,
+            to_output.flatten(1),
+        )
+
+    apply = torch.compile(plain_step) if compiled else plain_step
+    hidden, bias, output = case.weights
+    inputs = (
+        grid.spread(place.tensor(case.state[:-1])),
+        place.tensor(hidden[:, order.numpy(), None, None, None]),
+        place.tensor(bias),
+        place.tensor(output[..., None, None, None]),
+    )
+    gradient = grid.spread(place.tensor(case.gradient[:-1]))
+    return Contender(step, tuple(t.requires_grad_() for t in inputs), gradient, listed)
+
+
+def _packaged(case: Case, name: str, place: Place, *, threads: int) -> Contender:
+    """A backend of vnca, on the list of living cells."""
+    update = torch_step(name, device=place.device, threads=threads)
+    rows, neighbours = (
+        torch.from_numpy(array).to(place.device) for array in (case.rows, case.domain.neighbours)
+    )
+    priors = place.tensor(case.priors)
+    # The fast kernels read from it what the filters are multiples of, and want it exact.
+    filters = torch.from_numpy(stencil()).to(place.device)
+    if name == "reference":
+        filters = filters.to(place.dtype)
+
+    def step(state: Tensor, *weights: Tensor) -> Tensor:
+        return update(state, rows, neighbours, priors, Weights(*weights), filters)
+
+    inputs = tuple(place.tensor(array).requires_grad_() for array in (case.state, *case.weights))
+    return Contender(step, inputs, place.tensor(case.gradient), lambda *results: results)

@@ -1,0 +1,195 @@
+"""Painting a sequence in every backend that works on arrays: computing only, and with files."""
+
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.automaton.stepper import stepper
+from vnca.bench.agreement import Difference, require_agreement
+from vnca.bench.memory import peak_mb
+from vnca.bench.timing import Spread, in_turns
+from vnca.errors import BackendUnavailableError
+from vnca.io.sequence import FrameSequence, find_frames
+from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_smoke
+from vnca.kernels.update.backend import choose
+from vnca.simulate.scenes import simulate
+from vnca.stylize.config import StylizeConfig
+from vnca.stylize.painter import Painter
+from vnca.stylize.roll import Roll
+from vnca.typing import Box, FloatArray
+from vnca.volume import Volume
+
+BACKENDS = ("native", "reference")
+TOLERANCE = 1e-3
+"""Of the state after the first frame: norm of the difference over the norm. A trained rule
+multiplies what rounding does in tens of steps."""
+_LATEST = 3
+"""The simulated frames are the last of this many times as many: smoke has risen by then."""
+
+
+@dataclass(frozen=True)
+class PaintedSequence:
+    """What is painted again and again.
+
+    Attributes:
+        rule: The rule.
+        sequence: The files.
+        smoke: How they are read.
+        volumes: The same frames, read.
+        config: How the rule is rolled over them.
+    """
+
+    rule: Rule
+    sequence: FrameSequence
+    smoke: SmokeFormat
+    volumes: Sequence[Volume]
+    config: StylizeConfig
+
+    @classmethod
+    def read(
+        cls, rule: Rule, sequence: FrameSequence, smoke: SmokeFormat, *, steps: int | None
+    ) -> "PaintedSequence":
+        """The frames of a sequence; all have equally many steps, the first too.
+
+        Raises:
+            VncaError: If a frame cannot be read.
+        """
+        volumes = [read_smoke(f.path, smoke, frame=f.number) for f in sequence]
+        config = StylizeConfig(steps_per_frame=steps, warmup=0)
+        return cls(rule, sequence, smoke, volumes, config)
+
+    def roll(self, backend: str, threads: int) -> Roll:
+        """The rule in a backend, ready for the sequence."""
+        box = Box((0, 0, 0), (0, 0, 0))
+        for frame in self.sequence:
+            box = box.union(smoke_box(frame.path, self.smoke))
+        return Roll(self.rule, stepper(self.rule, backend, threads=threads), self.config, box)
+
+
+def random_rule(hidden: int, seed: int = 0) -> Rule:
+    """A rule that was not trained, but changes all it sees a little."""
+    rule = Rule.initial(RuleConfig(hidden=hidden, position_prior=False), Scales(), seed=seed)
+    output = np.random.default_rng(seed).normal(0, 0.01, rule.output.shape)
+    return replace(rule, output=output.astype(np.float32))
+
+
+def simulated(folder: Path, *, resolution: int, frames: int) -> FrameSequence:
+    """The last frames of a simulated plume, written to a folder.
+
+    Raises:
+        VncaError: If they cannot be simulated or written.
+    """
+    plume = simulate("plume", resolution=resolution, frames=_LATEST * frames, seed=0)
+    for volume in islice(plume, (_LATEST - 1) * frames, None):
+        write_smoke(folder / f"plume_{volume.frame:04d}.vdb", volume)
+    return find_frames(folder)
+
+
+def available() -> tuple[str, ...]:
+    """The backends that can run here."""
+
+    def runs(name: str) -> bool:
+        try:
+            return choose(name) == name
+        except BackendUnavailableError:
+            return False
+
+    return tuple(filter(runs, BACKENDS))
+
+
+def measure_stylizing(
+    painted: PaintedSequence, backends: Sequence[str], *, threads: int, repeats: int
+) -> list[dict[str, Any]]:
+    """A row for each backend, computing only and with files: seconds a frame.
+
+    Raises:
+        BackendUnavailableError: If a backend cannot run here.
+        DisagreementError: If backends do not paint the same; then nothing is timed.
+    """
+    rolls = {name: painted.roll(name, threads) for name in backends}
+    first = {name: roll.paint(painted.volumes[0], roll.start()) for name, roll in rolls.items()}
+    require_agreement(_differences({name: p.state.values for name, p in first.items()}))
+    with tempfile.TemporaryDirectory() as folder:
+        works: dict[tuple[str, bool], Callable[[], object]] = {}
+        for name, roll in rolls.items():
+            works[name, False] = partial(_compute, roll, painted.volumes)
+            works[name, True] = partial(_paint, _painter(painted, roll, Path(folder)))
+        begins = {key: partial(_ready, work) for key, work in works.items()}
+        times = in_turns(begins, "cpu", repeats)
+        peaks = {key: peak_mb(work, "cpu") for key, work in works.items()}
+    roll = rolls[backends[0]]
+    cells = round(np.mean(_compute(roll, painted.volumes)))
+    frames, steps = len(painted.volumes), roll.steps_per_frame
+    rows = []
+    for (name, files), taken in times.items():
+        spread = Spread.of([seconds / frames for seconds in taken])
+        rows.append(
+            {
+                "backend": name,
+                "files": files,
+                "grid": "x".join(map(str, roll.box.shape)),
+                "frames": frames,
+                "cells": cells,
+                "steps": steps,
+                "hidden": painted.rule.config.hidden,
+                "seconds_min": round(spread.least, 5),
+                "seconds": round(spread.median, 5),
+                "seconds_max": round(spread.most, 5),
+                "frames_per_second": round(1 / spread.median, 2),
+                "ns_per_cell": round(spread.median * 1e9 / (cells * steps), 2),
+                "peak_mb": peaks[name, files],
+            }
+        )
+    return rows
+
+
+def _differences(states: dict[str, FloatArray]) -> list[Difference]:
+    expected = next(iter(states.values())).astype(float)
+    size = np.linalg.norm(expected)
+    return [
+        Difference(
+            name, "state after a frame", float(np.linalg.norm(got - expected) / size), TOLERANCE
+        )
+        for name, got in states.items()
+    ]
+
+
+def _ready(work: Callable[[], object]) -> Callable[[], object]:
+    return work
+
+
+def _compute(roll: Roll, volumes: Sequence[Volume]) -> list[int]:
+    """How many cells lived in each frame."""
+    state, cells = roll.start(), []
+    for volume in volumes:
+        state = roll.paint(volume, state).state
+        cells.append(len(state.cells))
+    return cells
+
+
+def _painter(painted: PaintedSequence, roll: Roll, folder: Path) -> Painter:
+    return Painter(
+        painted.sequence,
+        folder,
+        roll,
+        painted.smoke,
+        colour_grids=("Cd",),
+        on_error="stop",
+        conditions={},
+        tell=lambda line: None,
+    )
+
+
+def _paint(painter: Painter) -> None:
+    with closing(painter.paint(painter.begin(resume=False))) as paths:
+        for _ in paths:
+            pass
+    painter.discard()

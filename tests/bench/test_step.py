@@ -1,0 +1,138 @@
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+import torch
+from torch import Tensor
+
+from vnca.bench import contenders
+from vnca.bench.step import (
+    StepConfig,
+    StepRun,
+    measure_steps,
+    needed_bytes,
+    needed_flop,
+    prepare,
+)
+from vnca.errors import BackendUnavailableError, DisagreementError, OptionError, VncaError
+from vnca.kernels.update import native, reference
+
+Make = Callable[..., StepConfig]
+ALWAYS = ("plain", "reference")
+
+
+def rows_of(config: StepConfig) -> list[dict[str, Any]]:
+    prepare(config)
+    return [row for run in measure_steps(config) for row in run.rows]
+
+
+def test_every_backend_and_pass_gets_a_row_of_plausible_figures(small: Make) -> None:
+    passes = ("forward", "backward", "both")
+    config = small(backends=ALWAYS, passes=passes)
+    facts = prepare(config)
+    assert facts["device"]
+    (run,) = measure_steps(config)
+    assert isinstance(run, StepRun)
+    assert [(r["backend"], r["pass"]) for r in run.rows] == [
+        (name, part) for name in ALWAYS for part in passes
+    ]
+    for row in run.rows:
+        assert row["grid"] == "12x8x9"
+        assert row["hidden"] == 16
+        assert 0 < row["occupancy"] < 1
+        assert 0 < row["ns_per_cell_min"] <= row["ns_per_cell"] <= row["ns_per_cell_max"]
+        assert row["gflops"] > 0
+        assert 0 < row["share_of_gemm"] < 1
+        assert row["gemm_gflops"] == pytest.approx(run.gemm_gflops, abs=0.1)
+        assert row["peak_mb"] is None or row["peak_mb"] >= 0
+
+
+@pytest.mark.skipif(native.unavailable() is not None, reason="no native kernel")
+def test_all_backends_there_are_take_part_unless_named(
+    small: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(contenders.shutil, "which", lambda name: None)
+    found = {row["backend"] for row in rows_of(small(passes=("forward",), repeats=1))}
+    assert {"plain", "reference", "native"} <= found
+    assert "compile" not in found
+
+
+def test_bfloat16_is_held_to_what_it_can_hold(small: Make) -> None:
+    config = small(backends=ALWAYS, dtypes=("float32", "bfloat16"), repeats=1)
+    assert {row["dtype"] for row in rows_of(config)} == {"float32", "bfloat16"}
+
+
+def wrong_state(state: Tensor, *rest: Any) -> Tensor:
+    result = reference.update(state, *rest)
+    return result + 1e-3 * (result - state)
+
+
+def wrong_gradient(state: Tensor, *rest: Any) -> Tensor:
+    result = reference.update(state, *rest)
+    return result + 0.01 * (state - state.detach())
+
+
+@pytest.mark.parametrize(
+    ("update", "complaint"),
+    [(wrong_state, "native: state"), (wrong_gradient, "native: gradient of the state")],
+)
+def test_nothing_is_timed_when_a_backend_computes_something_else(
+    small: Make,
+    monkeypatch: pytest.MonkeyPatch,
+    update: Callable[..., Tensor],
+    complaint: str,
+) -> None:
+    ours = contenders.torch_step
+    monkeypatch.setattr(contenders, "choose", lambda name, device: name)
+    monkeypatch.setattr(
+        contenders,
+        "torch_step",
+        lambda name, **options: update if name == "native" else ours(name, **options),
+    )
+    monkeypatch.setattr("vnca.bench.step.measure", pytest.fail)
+    with pytest.raises(DisagreementError, match=complaint):
+        rows_of(small(backends=("plain", "native")))
+
+
+def test_a_state_of_nothing_but_nan_is_a_disagreement(
+    small: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(contenders, "plain_step", lambda grid, *rest: grid * torch.nan)
+    with pytest.raises(DisagreementError, match="plain: state is off by nan"):
+        rows_of(small(backends=("plain",), passes=("forward",)))
+
+
+def test_work_is_counted_as_the_readme_derives_it() -> None:
+    flop = needed_flop(128)
+    assert (flop["forward"], flop["backward"], flop["both"]) == (20224, 38656, 58880)
+    # 200×300×200 cells in half precision: 2.04 GB without the rows.
+    assert needed_bytes(2)["forward"] * 12_000_000 == 2_040_000_000
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"grid": (4, 0, 4)}, OptionError),
+        ({"hidden": 0}, OptionError),
+        ({"occupancy": 1.5}, OptionError),
+        ({"occupancy": float("nan")}, OptionError),
+        ({"repeats": 0}, OptionError),
+        ({"passes": ("up",)}, OptionError),
+        ({"passes": ()}, OptionError),
+        ({"dtypes": ("float8",)}, OptionError),
+        ({"dtypes": ("tf32",)}, OptionError),
+        ({"backends": ("nope",)}, OptionError),
+        ({"backends": ("triton",)}, BackendUnavailableError),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(
+    small: Make, options: dict[str, Any], error: type[VncaError]
+) -> None:
+    with pytest.raises(error):
+        prepare(small(**options))
+
+
+@pytest.mark.slow
+def test_the_compiled_plain_step_agrees_and_is_timed(small: Make) -> None:
+    names = [row["backend"] for row in rows_of(small(backends=("plain", "compile")))]
+    assert names == ["plain", "plain", "compile", "compile"]

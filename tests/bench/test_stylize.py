@@ -1,0 +1,67 @@
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vnca.automaton.rule import Rule
+from vnca.automaton.stepper import Step, stepper
+from vnca.bench import stylize
+from vnca.bench.stylize import PaintedSequence, available, measure_stylizing, random_rule
+from vnca.errors import DisagreementError
+from vnca.io.sequence import find_frames
+from vnca.io.smoke import SmokeFormat, write_smoke
+from vnca.volume import Volume
+
+
+@pytest.fixture
+def painted(tiny_smoke: Volume, tmp_path: Path) -> PaintedSequence:
+    """A ball that rises for two frames."""
+    x, y, z = tiny_smoke.origin
+    for number in (1, 2):
+        moved = replace(tiny_smoke, origin=(x, y, z + number), frame=number)
+        write_smoke(tmp_path / f"ball_{number}.vdb", moved)
+    return PaintedSequence.read(random_rule(8), find_frames(tmp_path), SmokeFormat(), steps=3)
+
+
+def test_computing_and_files_are_timed_in_every_backend(
+    painted: PaintedSequence, tmp_path: Path
+) -> None:
+    before = sorted(tmp_path.iterdir())
+    rows = measure_stylizing(painted, available(), threads=1, repeats=2)
+    assert [(r["backend"], r["files"]) for r in rows] == [
+        (name, files) for name in available() for files in (False, True)
+    ]
+    for row in rows:
+        assert (row["frames"], row["steps"], row["hidden"]) == (2, 3, 8)
+        assert 500 < row["cells"] < 12**3 + 1  # a ball of radius 5.5 and what is around it
+        assert 0 < row["seconds_min"] <= row["seconds"] <= row["seconds_max"]
+        assert row["frames_per_second"] == pytest.approx(1 / row["seconds"], rel=0.05)
+        per_cell = row["seconds"] * 1e9 / (row["cells"] * row["steps"])
+        assert row["ns_per_cell"] == pytest.approx(per_cell, rel=0.05)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_nothing_is_timed_when_a_backend_paints_something_else(
+    painted: PaintedSequence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def careless(rule: Rule, backend: str, **options: Any) -> Step:
+        if backend == "native":
+            rule = replace(rule, output=(1.1 * rule.output).astype(np.float32))
+        return stepper(rule, "reference", **options)
+
+    def never(*arguments: Any) -> None:
+        pytest.fail("timed")
+
+    monkeypatch.setattr(stylize, "stepper", careless)
+    monkeypatch.setattr(stylize, "in_turns", never)
+    with pytest.raises(DisagreementError, match="native: state after a frame"):
+        measure_stylizing(painted, ("reference", "native"), threads=1, repeats=1)
+
+
+def test_a_random_rule_changes_what_it_sees(painted: PaintedSequence) -> None:
+    roll = painted.roll("reference", 1)
+    values = roll.paint(painted.volumes[0], roll.start()).state.values
+    assert np.isfinite(values).all()
+    assert np.abs(values[:-1]).max() > 1e-3
