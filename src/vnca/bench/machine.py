@@ -9,9 +9,9 @@ import vnca
 
 
 def run_facts(device: str, threads: int) -> dict[str, str | int]:
-    """What every row of a run shares: date, device, threads and versions."""
+    """What every row of a run, and of no other, shares: when, device, threads and versions."""
     return {
-        "date": datetime.now(timezone.utc).date().isoformat(),
+        "date": datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M:%S"),
         "device": device_name(device),
         "threads": threads,
         "torch": _version("torch"),
