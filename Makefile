@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo test test-slow test-faults fuzz audit check format lock bench bench-flow clean
+.PHONY: setup demo test test-slow test-faults sanitize fuzz audit check format lock bench bench-flow clean
 
 setup: $(READY)
 
@@ -30,6 +30,14 @@ test-slow: setup
 
 test-faults: setup
 	$(BIN)/pytest -m faults tests/faults
+
+# The native kernel's own tests, which need no Python, under each kind of sanitizer.
+sanitize: setup
+	for kind in thread address,undefined; do \
+	  $(BIN)/cmake -S . -B build/sanitize-$$kind -DVNCA_SANITIZE=$$kind && \
+	  $(BIN)/cmake --build build/sanitize-$$kind && \
+	  build/sanitize-$$kind/test_step || exit 1; \
+	done
 
 # Coverage-guided; the seconds are shared by all targets. Findings are left in build/fuzz.
 FUZZ_SECONDS ?= 600

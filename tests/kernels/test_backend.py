@@ -1,5 +1,8 @@
 """Which backend runs, and what a user hears about it."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -51,6 +54,25 @@ def test_arrays_are_stepped_even_without_a_compiler_and_torch() -> None:
     assert array_step().__module__ == "vnca.kernels.update.array_reference"
     with pytest.raises(BackendUnavailableError, match=r"triton cannot run: .*vnca\[train\]"):
         choose("triton", device="cuda")
+
+
+@pytest.mark.parametrize("step", [array_step, torch_step])
+def test_bfloat16_is_computed_as_asked_or_not_at_all(
+    step: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(BackendUnavailableError, match="reference cannot run with bfloat16"):
+        step("reference", precision="bfloat16")
+    with pytest.raises(OptionError, match="expected float32 or bfloat16, got half"):
+        step(precision="half")
+
+    class WithoutBfloat16:
+        def instructions(self, bfloat16: bool) -> list[str]:
+            return [] if bfloat16 else ["portable"]
+
+    monkeypatch.setattr(native, "_native", WithoutBfloat16())
+    with pytest.raises(BackendUnavailableError, match=r"native cannot run .* AVX512_BF16"):
+        step("native", precision="bfloat16")
+    assert step("native").keywords["precision"] == "float32"
 
 
 def test_unknown_backends_and_devices_are_refused() -> None:

@@ -1,6 +1,6 @@
 from vnca.typing import FloatArray, IntArray
 
-def instructions() -> list[str]: ...
+def instructions(bfloat16: bool, /) -> list[str]: ...
 def forward(
     state: FloatArray,
     rows: IntArray,
@@ -12,6 +12,7 @@ def forward(
     stencil: FloatArray,
     out: FloatArray,
     threads: int,
+    bfloat16: bool,
     instructions: str,
     /,
 ) -> None: ...
@@ -30,6 +31,7 @@ def backward(
     to_bias: FloatArray,
     to_output: FloatArray,
     threads: int,
+    bfloat16: bool,
     instructions: str,
     /,
 ) -> None: ...

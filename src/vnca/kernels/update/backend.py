@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from vnca.errors import BackendUnavailableError, OptionError
 from vnca.kernels.update import native
+from vnca.kernels.update.native import Precision
 from vnca.typing import FloatArray
 
 Backend = Literal["native", "triton", "reference"]
@@ -45,17 +46,31 @@ def choose(backend: str = "auto", *, device: str = "cpu") -> Backend:
 
 
 def torch_step(
-    backend: str = "auto", *, device: str = "cpu", threads: int | None = None
+    backend: str = "auto",
+    *,
+    device: str = "cpu",
+    threads: int | None = None,
+    precision: Precision = "float32",
 ) -> Callable[..., Any]:
     """The differentiable step on tensors, called as `vnca.kernels.update.reference.update` is.
 
-    `threads` counts for the native kernel only; the reference uses as many as torch does.
+    Args:
+        backend: As in `choose`.
+        device: As in `choose`.
+        threads: How many the native kernel uses; the reference uses as many as torch does.
+        precision: What the native kernel rounds the factors of its products to. The others have
+            only float32: they compute in the type of the state that they are given.
+
+    Raises:
+        BackendUnavailableError: If the backend asked for cannot run here, or not so.
+        OptionError: If there is no backend or precision of that name.
     """
     chosen = choose(backend, device=device)
+    _check(precision, chosen)
     if chosen == "native":
         from vnca.kernels.update.native_autograd import update
 
-        return partial(update, threads=threads)
+        return partial(update, threads=threads, precision=precision)
     if chosen == "triton":
         from vnca.kernels.update.triton import update
 
@@ -65,22 +80,37 @@ def torch_step(
     return update
 
 
-def array_step(backend: str = "auto", *, threads: int | None = None) -> Callable[..., FloatArray]:
+def array_step(
+    backend: str = "auto", *, threads: int | None = None, precision: Precision = "float32"
+) -> Callable[..., FloatArray]:
     """The step on arrays, called as `vnca.kernels.update.native.forward` is, up to `stencil`.
 
     None of them uses torch: the reference on arrays is written in numpy, and uses as many threads
-    as that does. Triton works on tensors that stay on the GPU, not on arrays.
+    as that does. Triton works on tensors that stay on the GPU, not on arrays. Arguments and errors
+    are those of `torch_step`.
     """
     if backend == "triton":
         raise BackendUnavailableError(
             "backend triton cannot run: it works on tensors on a GPU, not on arrays in main "
             "memory; expected auto, native or reference"
         )
-    if choose(backend) == "native":
-        return partial(native.forward, threads=threads)
+    chosen = choose(backend)
+    _check(precision, chosen)
+    if chosen == "native":
+        return partial(native.forward, threads=threads, precision=precision)
     from vnca.kernels.update.array_reference import update
 
     return update
+
+
+def _check(precision: Precision, chosen: Backend) -> None:
+    reason = native.unavailable(precision)
+    if precision == "float32":
+        return
+    if chosen != "native":
+        reason = "only the native kernel has it; use precision float32"
+    if reason is not None:
+        raise BackendUnavailableError(f"backend {chosen} cannot run with {precision}: {reason}")
 
 
 def _native_unavailable(device: str) -> str | None:

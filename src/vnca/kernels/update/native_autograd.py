@@ -20,6 +20,7 @@ def update(
     stencil: Tensor,
     *,
     threads: int | None = None,
+    precision: native.Precision = "float32",
 ) -> Tensor:
     """The state after one step, as `vnca.kernels.update.reference.update` has it.
 
@@ -34,12 +35,13 @@ def update(
         weights: W1, b1 and W2.
         stencil: `[5, 27]` perception filters.
         threads: How many to use; by default one for each core.
+        precision: What the factors of the products are rounded to, forward and backward.
 
     Raises:
-        BackendUnavailableError: If the native kernel was not built.
+        BackendUnavailableError: If the native kernel was not built, or has no such precision here.
         ShapeError: If shapes, types or indices are not as above.
     """
-    result = _Update.apply(state, rows, neighbours, priors, *weights, stencil, threads)
+    result = _Update.apply(state, rows, neighbours, priors, *weights, stencil, threads, precision)
     assert isinstance(result, Tensor)
     return result
 
@@ -47,9 +49,10 @@ def update(
 class _Update(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, *inputs: Any) -> Tensor:
-        *tensors, ctx.threads = inputs
+        *tensors, threads, precision = inputs
+        ctx.options = {"threads": threads, "precision": precision}
         ctx.save_for_backward(*tensors)
-        return torch.from_numpy(native.forward(*map(_array, tensors), threads=ctx.threads))
+        return torch.from_numpy(native.forward(*map(_array, tensors), **ctx.options))
 
     @staticmethod
     @once_differentiable
@@ -57,8 +60,8 @@ class _Update(torch.autograd.Function):
         ctx: Any, *grad_outputs: Tensor
     ) -> tuple[Tensor | None, ...]:
         arrays = map(_array, (*ctx.saved_tensors, *grad_outputs))
-        to_state, *to_weights = map(torch.from_numpy, native.backward(*arrays, threads=ctx.threads))
-        return to_state, None, None, None, *to_weights, None, None
+        to_state, *to_weights = map(torch.from_numpy, native.backward(*arrays, **ctx.options))
+        return to_state, None, None, None, *to_weights, None, None, None
 
 
 def _array(tensor: Tensor) -> AnyArray:

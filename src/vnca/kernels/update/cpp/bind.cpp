@@ -168,10 +168,19 @@ void check_apart(std::initializer_list<Extent> outputs, std::initializer_list<Ex
     }
 }
 
-const Kernel& kernel_named(const std::string& name) {
+// Kernels that this machine can run and that multiply numbers of the given kind, fastest first.
+std::vector<const Kernel*> kernels_for(bool bfloat16) {
+    std::vector<const Kernel*> found;
     for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel)
-        if (name.empty() || name == (*kernel)->name) return **kernel;
-    throw nb::value_error(("this machine does not run the native kernel for " + name).c_str());
+        if ((*kernel)->bfloat16 == bfloat16) found.push_back(*kernel);
+    return found;
+}
+
+const Kernel& kernel_named(const std::string& name, bool bfloat16) {
+    for (const Kernel* const kernel : kernels_for(bfloat16))
+        if (name.empty() || name == kernel->name) return *kernel;
+    throw nb::value_error(("this machine does not run the native kernel for " +
+                           (name.empty() ? "bfloat16" : name)).c_str());
 }
 
 }  // namespace
@@ -179,19 +188,18 @@ const Kernel& kernel_named(const std::string& name) {
 NB_MODULE(_native, m) {
     m.doc() = "The native step of the automaton; see native.py.";
 
-    m.def("instructions", [] {
+    m.def("instructions", [](bool bfloat16) {
         std::vector<std::string> names;
-        for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel)
-            names.emplace_back((*kernel)->name);
+        for (const Kernel* const kernel : kernels_for(bfloat16)) names.emplace_back(kernel->name);
         return names;
     });
 
     m.def("forward", [](Input state, Input rows, Input neighbours, Input priors, Input first,
                         Input bias, Input second, Input stencil, Output out, int threads,
-                        const std::string& instructions) {
+                        bool bfloat16, const std::string& instructions) {
         const Arrays arrays(state, rows, neighbours, priors, first, bias, second, stencil);
         const Step& step = arrays.step;
-        const Kernel& kernel = kernel_named(instructions);
+        const Kernel& kernel = kernel_named(instructions, bfloat16);
         float* const to = data_of<float>(out, "out", {step.cells + 1, step.channels});
         check_apart({out}, {state, rows, neighbours, priors, first, bias, second, stencil});
         bool valid;
@@ -206,10 +214,10 @@ NB_MODULE(_native, m) {
     m.def("backward", [](Input state, Input rows, Input neighbours, Input priors, Input first,
                          Input bias, Input second, Input stencil, Input gradient,
                          Output to_state, Output to_first, Output to_bias, Output to_second,
-                         int threads, const std::string& instructions) {
+                         int threads, bool bfloat16, const std::string& instructions) {
         const Arrays arrays(state, rows, neighbours, priors, first, bias, second, stencil);
         const Step& step = arrays.step;
-        const Kernel& kernel = kernel_named(instructions);
+        const Kernel& kernel = kernel_named(instructions, bfloat16);
         const std::vector<std::int64_t> shape = {step.cells + 1, step.channels};
         const float* const from = data_of<float>(gradient, "gradient", shape);
         const Gradients to = {

@@ -47,6 +47,7 @@ struct Sizes {
 
 struct Kernel {
     const char* name;
+    bool bfloat16;  // what products multiply, else float; all else is float
     Sizes (*sizes)(const Step&);
     void (*pack)(const Step&, float* packed);
 
@@ -59,7 +60,8 @@ struct Kernel {
                      float* scratch, float* weights, float* state);
 };
 
-// One for each instruction set that this build knows, fastest first; null if it was left out.
+// One for each instruction set that this build knows, fastest first.
+namespace avx512bf16 { extern const Kernel kernel; }
 namespace avx512 { extern const Kernel kernel; }
 namespace avx2 { extern const Kernel kernel; }
 namespace portable { extern const Kernel kernel; }

@@ -76,6 +76,20 @@ bool find_neighbours(const Step& step, Block& block) {
     return std::int64_t(largest) <= step.cells;
 }
 
+// Brings the neighbours of a few cells, in ascending rows, closer while others are worked on. Where
+// the cells lie far apart, only those of the first: it takes a line for every few cells.
+void fetch_neighbours(const Step& step, const std::int32_t* rows, std::int64_t count) {
+    constexpr int LINE = 64 / sizeof(std::int32_t), FURTHEST = 4 * BLOCK;
+    if (count == 0) return;
+    const std::int64_t first = rows[0];
+    const std::int64_t last = std::min<std::int64_t>(rows[count - 1], first + FURTHEST);
+    for (int o = 0; o < NEIGHBOURS; ++o) {
+        const std::int32_t* const from = step.neighbours + o * step.cells;
+        for (std::int64_t cell = first; cell < last; cell += LINE) __builtin_prefetch(from + cell);
+        __builtin_prefetch(from + last);
+    }
+}
+
 // Calls visit(block) for all rows within [begin, end), block by block; false if one goes wrong.
 template <class Visit>
 bool each_block(const Step& step, Rows rows, std::int64_t begin, std::int64_t end,
@@ -87,6 +101,8 @@ bool each_block(const Step& step, Rows rows, std::int64_t begin, std::int64_t en
         block.rows = row;
         block.count = int(std::min<std::int64_t>(BLOCK, last - row));
         if (!find_neighbours(step, block)) return false;
+        const std::int32_t* const next = row + block.count;
+        fetch_neighbours(step, next, std::min<std::int64_t>(BLOCK, last - next));
         visit(block);
     }
     return true;
@@ -194,6 +210,10 @@ const Kernel* const* kernels() {
     static const auto found = [] {
         std::vector<const Kernel*> list;
 #if defined(__x86_64__)
+#if defined(VNCA_AVX512BF16)
+        if (runs_avx512() && __builtin_cpu_supports("avx512bf16"))
+            list.push_back(&avx512bf16::kernel);
+#endif
         if (runs_avx512()) list.push_back(&avx512::kernel);
         if (runs_avx2()) list.push_back(&avx2::kernel);
 #endif

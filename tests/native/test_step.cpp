@@ -1,0 +1,307 @@
+// The native step without Python: held to a scalar one in double precision on odd shapes, to the
+// same bits whatever the number of threads, and to what it promises where something is wrong. Made
+// to be run under sanitizers (`make sanitize`): arrays are exactly as large as the step is told.
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "crew.hpp"
+#include "step.hpp"
+
+using namespace vnca;
+
+namespace {
+
+constexpr int THREADS[] = {1, 2, 3, 8};
+
+void expect(bool holds, const std::string& what) {
+    if (holds) return;
+    std::fprintf(stderr, "failed: %s\n", what.c_str());
+    std::exit(1);
+}
+
+// ---- Problems --------------------------------------------------------------------------------
+
+struct Case {
+    const char* name;
+    int x, y, z;
+    double alive, changing;  // shares of the cells
+    int channels, hidden, priors;
+    bool tangled = false;  // any cell may neighbour any other
+};
+
+constexpr Case CASES[] = {
+    {"one cell", 1, 1, 1, 1, 1, 5, 17, 0},
+    {"odd", 7, 9, 11, 1, 0.5, 12, 128, 7},
+    {"several ranges", 33, 8, 65, 1, 0.5, 12, 32, 7},
+    {"no cell", 4, 4, 4, 0, 1, 12, 32, 7},
+    {"scattered", 24, 25, 26, 0.1, 0.5, 5, 33, 3},
+    {"no change", 6, 5, 4, 1, 0, 12, 32, 7},
+    {"thin", 1, 1, 65, 1, 1, 1, 1, 1},
+    {"wide", 5, 6, 7, 1, 1, 64, 512, 16},
+    {"many channels", 9, 8, 7, 0.6, 0.5, 20, 100, 2},
+    {"tangled", 16, 17, 18, 1, 0.5, 3, 9, 1, true},
+};
+
+struct Problem {
+    Case of;
+    std::int64_t cells = 0;
+    std::vector<std::int32_t> neighbours, rows;
+    std::vector<float> state, priors, first, bias, second, gradient;
+
+    explicit Problem(const Case& c) : of(c) {
+        std::mt19937 random(7);
+        std::uniform_real_distribution<double> share;
+        std::normal_distribution<float> normal;
+        std::vector<std::int32_t> row_at(std::size_t(c.x) * c.y * c.z, -1);
+        for (std::int32_t& row : row_at)
+            if (share(random) < c.alive) row = std::int32_t(cells++);
+        for (std::int32_t& row : row_at)
+            if (row < 0) row = std::int32_t(cells);
+
+        // The border repeats cells; where nothing lives is the row behind the last.
+        const auto at = [&](int x, int y, int z) -> std::int32_t& {
+            return row_at[(std::clamp(x, 0, c.x - 1) * c.y + std::clamp(y, 0, c.y - 1)) * c.z +
+                          std::clamp(z, 0, c.z - 1)];
+        };
+        neighbours.resize(NEIGHBOURS * cells);
+        for (int x = 0; x < c.x; ++x)
+            for (int y = 0; y < c.y; ++y)
+                for (int z = 0; z < c.z; ++z)
+                    if (const std::int64_t cell = at(x, y, z); cell < cells)
+                        for (int o = 0; o < NEIGHBOURS; ++o)
+                            neighbours[o * cells + cell] =
+                                at(x + o / 9 - 1, y + o / 3 % 3 - 1, z + o % 3 - 1);
+        if (c.tangled)
+            for (std::int32_t& row : neighbours) row = std::int32_t(random() % (cells + 1));
+        for (std::int64_t cell = 0; cell < cells; ++cell)
+            if (share(random) < c.changing) rows.push_back(std::int32_t(cell));
+
+        const auto draw = [&](std::size_t size, float scale) {
+            std::vector<float> values(size);
+            for (float& value : values) value = scale * normal(random);
+            return values;
+        };
+        const int inputs = FILTERS * c.channels + c.priors;
+        state = draw((cells + 1) * c.channels, 1);
+        std::fill(state.end() - c.channels, state.end(), 0.0f);
+        priors = draw(cells * c.priors, 1);
+        first = draw(std::size_t(c.hidden) * inputs, 0.1f);
+        bias = draw(c.hidden, 0.1f);
+        second = draw(std::size_t(c.channels) * c.hidden, 0.1f);
+        gradient = draw(state.size(), 1);
+    }
+
+    Step step() const {
+        return {cells, of.channels, of.hidden, of.priors, state.data(), neighbours.data(),
+                priors.data(), first.data(), bias.data(), second.data(),
+                {1.0f, 1 / 30.0f, 1 / 31.0f, 1 / 32.0f, 1 / 26.0f}};
+    }
+};
+
+template <class Real>
+struct Results {
+    std::vector<Real> state, to_state, to_first, to_bias, to_second;
+
+    Results(const Problem& p, Real value)
+        : state(p.state.size(), value),
+          to_state(p.state.size(), value),
+          to_first(p.first.size(), value),
+          to_bias(p.bias.size(), value),
+          to_second(p.second.size(), value) {}
+
+    bool operator==(const Results&) const = default;
+};
+
+// ---- The step, as its equation has it --------------------------------------------------------
+
+double weight(int filter, int o) {
+    constexpr int SMOOTH[] = {1, 2, 1}, LAPLACIAN[] = {-88, 6, 3, 2};
+    const int offset[] = {o / 9 - 1, o / 3 % 3 - 1, o % 3 - 1};
+    const int distance = std::abs(offset[0]) + std::abs(offset[1]) + std::abs(offset[2]);
+    if (filter == 0) return distance == 0;
+    if (filter == 4) return LAPLACIAN[distance];
+    int sobel = offset[filter - 1];
+    for (int axis = 0; axis < 3; ++axis)
+        if (axis != filter - 1) sobel *= SMOOTH[offset[axis] + 1];
+    return sobel;
+}
+
+float to_bfloat16(float x) {
+    std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
+    bits += 0x7fff + (bits >> 16 & 1);
+    return std::bit_cast<float>(bits & 0xffff0000);
+}
+
+// With every factor of the products rounded to bfloat16, if asked for.
+Results<double> exact(const Problem& p, bool bfloat16) {
+    const Step s = p.step();
+    const int inputs = s.inputs(), filtered = FILTERS * s.channels;
+    const std::int64_t channels = s.channels;
+    const auto factor = [&](double x) { return bfloat16 ? to_bfloat16(float(x)) : x; };
+    const auto scale = [&](int k) { return k < filtered ? s.scale[k / s.channels] : 1.0; };
+    std::vector<double> first(p.first.size()), second(p.second.size());
+    for (std::size_t i = 0; i < first.size(); ++i)
+        first[i] = factor(scale(int(i % inputs)) * p.first[i]);
+    std::transform(p.second.begin(), p.second.end(), second.begin(), factor);
+
+    Results<double> result(p, 0);
+    std::copy(p.state.begin(), p.state.end(), result.state.begin());
+    std::copy(p.gradient.begin(), p.gradient.end() - s.channels, result.to_state.begin());
+    std::vector<double> z(inputs), to_z(inputs), gradient(s.channels);
+    for (const std::int64_t row : p.rows) {
+        const auto each_weight = [&](const auto& visit) {
+            for (int k = 0; k < filtered; ++k)
+                for (int o = 0; o < NEIGHBOURS; ++o)
+                    visit(k, s.neighbours[o * s.cells + row] * channels + k % channels,
+                          weight(k / channels, o));
+        };
+        std::fill(z.begin(), z.end(), 0);
+        std::fill(to_z.begin(), to_z.end(), 0);
+        each_weight([&](int k, std::int64_t from, double w) { z[k] += w * s.state[from]; });
+        std::copy_n(s.prior_values + row * s.priors, s.priors, z.begin() + filtered);
+        std::transform(z.begin(), z.end(), z.begin(), factor);
+        std::transform(&p.gradient[row * s.channels], &p.gradient[(row + 1) * s.channels],
+                       gradient.begin(), factor);
+
+        for (int unit = 0; unit < s.hidden; ++unit) {
+            double sum = s.bias[unit], to_sum = 0;
+            for (int k = 0; k < inputs; ++k) sum += first[unit * inputs + k] * z[k];
+            const double hidden = factor(sum);
+            if (!(hidden > 0)) continue;
+            for (int c = 0; c < s.channels; ++c) {
+                result.state[row * s.channels + c] += second[c * s.hidden + unit] * hidden;
+                result.to_second[c * s.hidden + unit] += gradient[c] * hidden;
+                to_sum += second[c * s.hidden + unit] * gradient[c];
+            }
+            to_sum = factor(to_sum);
+            result.to_bias[unit] += to_sum;
+            for (int k = 0; k < inputs; ++k) {
+                result.to_first[unit * inputs + k] += to_sum * z[k] * scale(k);
+                to_z[k] += to_sum * first[unit * inputs + k];
+            }
+        }
+        each_weight([&](int k, std::int64_t to, double w) { result.to_state[to] += w * to_z[k]; });
+    }
+    std::fill(result.to_state.end() - s.channels, result.to_state.end(), 0);
+    return result;
+}
+
+// ---- The step under test ---------------------------------------------------------------------
+
+// Forward and backward, into arrays of other content; false if either says so.
+bool run(const Kernel& kernel, const Problem& p, int threads, Results<float>& to) {
+    to = Results<float>(p, 1e30f);
+    const Rows rows = {p.rows.data(), std::int64_t(p.rows.size())};
+    const bool valid = forward(kernel, p.step(), rows, to.state.data(), threads);
+    const Gradients gradients = {to.to_state.data(), to.to_first.data(), to.to_bias.data(),
+                                 to.to_second.data()};
+    return backward(kernel, p.step(), rows, p.gradient.data(), gradients, threads) && valid;
+}
+
+Results<float> results(const Kernel& kernel, const Problem& p, int threads) {
+    Results<float> to(p, 0);
+    expect(run(kernel, p, threads, to), std::string(p.of.name) + ": a right problem is refused");
+    return to;
+}
+
+// The norm of the difference over the norm.
+double error(const std::vector<float>& got, const std::vector<double>& expected) {
+    double difference = 0, norm = 1e-30;
+    for (std::size_t i = 0; i < got.size(); ++i) {
+        difference += (got[i] - expected[i]) * (got[i] - expected[i]);
+        norm += expected[i] * expected[i];
+    }
+    return std::sqrt(difference / norm);
+}
+
+void test_agreement(const Problem& p) {
+    const Results<double> in_float = exact(p, false), in_bfloat16 = exact(p, true);
+    for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel) {
+        const std::string where = std::string(p.of.name) + ", " + (*kernel)->name + ": ";
+        const Results<float> got = results(**kernel, p, 1);
+        const Results<double>& right = (*kernel)->bfloat16 ? in_bfloat16 : in_float;
+        const auto check = [&](const char* name, const auto& values, const auto& expected) {
+            const double off = error(values, expected);
+            const bool fits = off <= ((*kernel)->bfloat16 ? 1e-4 : 2e-6);  // a NaN does not
+            expect(fits, where + name + " is off by " + std::to_string(off));
+        };
+        check("state", got.state, right.state);
+        check("gradient of the state", got.to_state, right.to_state);
+        check("gradient of W1", got.to_first, right.to_first);
+        check("gradient of b1", got.to_bias, right.to_bias);
+        check("gradient of W2", got.to_second, right.to_second);
+        for (const int threads : THREADS)
+            expect(results(**kernel, p, threads) == got,
+                   where + "other bits with " + std::to_string(threads) + " threads");
+    }
+}
+
+void test_neighbours_out_of_range() {
+    Problem p(CASES[2]);
+    Results<float> ignored(p, 0);
+    for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel)
+        for (const std::int64_t row : {std::int64_t(-1), p.cells + 1, std::int64_t(INT32_MAX)})
+            for (const int threads : THREADS) {
+                std::int32_t& entry = p.neighbours[11 * p.cells + p.rows.back()];
+                const std::int32_t before = std::exchange(entry, std::int32_t(row));
+                expect(!run(**kernel, p, threads, ignored), "a neighbour out of range is accepted");
+                entry = before;
+            }
+    std::int64_t still = 0;
+    while (std::binary_search(p.rows.begin(), p.rows.end(), std::int32_t(still))) ++still;
+    p.neighbours[still] = -1;
+    expect(run(**kernels(), p, 2, ignored), "neighbours of a cell that does not change are read");
+}
+
+void test_callers_at_the_same_time() {
+    const Problem p(CASES[2]);
+    const Results<float> alone = results(**kernels(), p, 1);
+    std::vector<std::thread> callers;
+    for (int caller = 0; caller < 3; ++caller)
+        callers.emplace_back([&] {
+            for (const int threads : THREADS)
+                expect(results(**kernels(), p, threads) == alone, "callers disturb each other");
+        });
+    for (std::thread& caller : callers) caller.join();
+}
+
+void test_an_exception_reaches_the_caller() {
+    Crew& crew = Crew::of_process();
+    for (const int threads : THREADS) {
+        bool caught = false;
+        try {
+            crew.run(100, threads, [](int task, int) {
+                if (task == 40) throw std::runtime_error("task");
+            });
+        } catch (const std::runtime_error&) {
+            caught = true;
+        }
+        expect(caught, "an exception of a task is lost");
+        std::atomic<int> done = 0;
+        crew.run(100, threads, [&](int, int) { ++done; });
+        expect(done == 100, "tasks are left out after an exception");
+    }
+}
+
+}  // namespace
+
+int main() {
+    for (const Case& c : CASES) test_agreement(Problem(c));
+    test_neighbours_out_of_range();
+    test_callers_at_the_same_time();
+    test_an_exception_reaches_the_caller();
+    std::printf("the native step holds with");
+    for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel)
+        std::printf(" %s", (*kernel)->name);
+    std::printf("\n");
+}
