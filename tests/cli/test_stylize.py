@@ -15,6 +15,7 @@ from vnca.cli import main
 from vnca.cli.stylize import Stylize
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
+from vnca.kernels.update import native
 from vnca.typing import AnyArray
 from vnca.volume import Volume
 
@@ -113,6 +114,26 @@ def test_both_backends_paint_alike(painted: Paint) -> None:
     native, reference = (painted("--backend", name) for name in ("native", "reference"))
     a, b = (dense(grids(out / "ball_0003.vdb")["Cd"])[0] for out in (native, reference))
     np.testing.assert_allclose(a, b, atol=1e-4)
+
+
+@pytest.mark.skipif(native.unavailable("bfloat16") is not None, reason="this processor has none")
+def test_short_numbers_paint_nearly_alike(painted: Paint) -> None:
+    whole, short = (painted("--precision", name) for name in ("float32", "bfloat16"))
+    a, b = (dense(grids(out / "ball_0003.vdb")["Cd"])[0] for out in (whole, short))
+    np.testing.assert_allclose(a, b, atol=0.02)
+    assert (a != b).any()
+
+
+def test_a_precision_that_cannot_be_had_is_told_before_work(
+    vnca: Vnca, model: Path, smoke: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = ["stylize", model, smoke, "--out", tmp_path / "out", "--precision", "bfloat16"]
+    complaint = vnca(*command, "--backend", "reference").complaint
+    assert "backend reference cannot run with bfloat16: only the native kernel has it" in complaint
+    reasons = {"float32": None, "bfloat16": "this processor lacks it"}
+    monkeypatch.setattr(native, "unavailable", lambda precision="float32": reasons[precision])
+    assert "native cannot run with bfloat16: this processor" in vnca(*command).complaint
+    assert not (tmp_path / "out").exists()
 
 
 def test_chosen_frames_only_and_gaps_are_told(vnca: Vnca, model: Path, smoke: Path) -> None:

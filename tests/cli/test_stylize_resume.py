@@ -14,6 +14,7 @@ from PIL import Image
 from vnca.automaton.model import MODEL_NAME, Model
 from vnca.automaton.rule import Rule
 from vnca.io.sequence import find_frames
+from vnca.kernels.update import native
 from vnca.stylize.roll import Painting, Roll, RollState
 from vnca.stylize.unfinished import Unfinished
 from vnca.volume import Volume
@@ -21,6 +22,9 @@ from vnca.volume import Volume
 Vnca = Callable[..., Any]
 QUICK = ("--warmup", 4, "--steps-per-frame", 2)
 During = Callable[[int, Callable[[], object]], None]
+needs_bfloat16 = pytest.mark.skipif(
+    native.unavailable("bfloat16") is not None, reason=str(native.unavailable("bfloat16"))
+)
 STATE = ".ball_0001.resume.safetensors"
 
 
@@ -181,6 +185,7 @@ def without_a_painted_frame(painted: Painted) -> None:
         (["--density-scale", 0.5], "--density-scale"),
         (["--colour-grid", "color"], "--colour-grid"),
         (["--backend", "reference"], "--backend"),
+        pytest.param(["--precision", "bfloat16"], "--precision", marks=needs_bfloat16),
         (["--velocity-scale", 2], "--velocity-scale"),
         (["--frames", "1-2"], "the list of frames"),
         (other_model, "the model is another"),

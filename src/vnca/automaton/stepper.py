@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from vnca.automaton.rule import Rule
 from vnca.kernels.update.backend import array_step
+from vnca.kernels.update.native import Precision
 from vnca.kernels.update.stencil import stencil
 from vnca.typing import FloatArray, IntArray
 
@@ -11,18 +12,25 @@ Step = Callable[[FloatArray, IntArray, IntArray, FloatArray], FloatArray]
 """A step: the new state from state, changing rows, neighbours and priors."""
 
 
-def stepper(rule: Rule, backend: str = "auto", *, threads: int | None = None) -> Step:
+def stepper(
+    rule: Rule,
+    backend: str = "auto",
+    *,
+    threads: int | None = None,
+    precision: Precision = "float32",
+) -> Step:
     """The step of a rule on arrays.
 
     Args:
         rule: Its weights and filters.
         backend: `auto`, `native` or `reference`.
         threads: How many the native kernel uses; by default one for each core.
+        precision: What the native kernel rounds the factors of its products to.
 
     Raises:
-        BackendUnavailableError: If the backend asked for, or any at all, cannot run here.
+        BackendUnavailableError: If the backend asked for cannot run here, or not so.
     """
-    apply = array_step(backend, threads=threads)
+    apply = array_step(backend, threads=threads, precision=precision)
     filters = stencil(
         sobel_divisor=rule.config.sobel_divisor, laplacian_divisor=rule.config.laplacian_divisor
     )

@@ -28,6 +28,7 @@ from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.io.video import SUFFIXES as FILMS
 from vnca.kernels.update.backend import choose
+from vnca.kernels.update.native import Precision
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.painter import OnError, Painter
 from vnca.stylize.roll import Roll
@@ -57,6 +58,9 @@ class Stylize:
     """Density that counts as 1; that of the training frame unless given."""
     backend: Literal["auto", "native", "reference"] = "auto"
     """What computes the automaton."""
+    precision: Precision = "float32"
+    """What the native kernel rounds the factors of its products to; bfloat16 is quicker where the
+    processor has it."""
     resume: bool = False
     """Go on with a painting that was ended before its last frame, to the very same files."""
     on_error: OnError = "stop"
@@ -131,7 +135,7 @@ def paint(options: Stylize, model: Model | None = None) -> None:
     smoke = with_fitted_scale(options.smoke, sequence)
     box = sequence_box(sequence, smoke, without_broken=options.on_error != "stop")
     backend = choose(options.backend)
-    roll = Roll(rule, stepper(rule, backend), options.config, box)
+    roll = Roll(rule, stepper(rule, backend, precision=options.precision), options.config, box)
     painter = Painter(
         sequence,
         options.out,
@@ -145,6 +149,7 @@ def paint(options: Stylize, model: Model | None = None) -> None:
             "the list of frames": [frame.path.name for frame in sequence],
             "the box of the smoke": box,
             "--backend": backend,
+            "--precision": options.precision,
             "--density-scale": scales.density,
             "--colour-grid": options.colour_grid,
             **{
