@@ -133,10 +133,10 @@ def backward(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Gradients of the state `[n + 1, C]`, W1, b1 and W2 from the gradient of `forward`'s result.
 
-    The hidden layer is computed anew. With `precision` bfloat16 the factors of the backward products
-    are rounded too, and gradients are those of the step as it is then computed. Bit-equal between
-    runs and whatever the number of threads. The gradient of the outside is zero. Arguments and
-    errors are those of `forward`.
+    The hidden layer is computed anew. With `precision` bfloat16 the factors of all products are
+    rounded, and gradients are those of the step as it is then computed. Bit-equal between runs and
+    whatever the number of threads. The gradient of the outside is zero. Arguments and errors are
+    those of `forward`.
     """
     results = tuple(np.empty_like(array) for array in (state, hidden, bias, output))
     arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, gradient)
