@@ -51,7 +51,7 @@ def test_every_backend_and_pass_gets_a_row_of_plausible_figures(small: Make) -> 
 def test_all_backends_there_are_take_part_unless_named(
     small: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(contenders.shutil, "which", lambda name: None)
+    monkeypatch.setattr(contenders, "_why_not_compiled", lambda device: "there is no compiler")
     found = {row["backend"] for row in rows_of(small(passes=("forward",), repeats=1))}
     assert {"plain", "reference", "native"} <= found
     assert "compile" not in found
@@ -60,6 +60,17 @@ def test_all_backends_there_are_take_part_unless_named(
 def test_bfloat16_is_held_to_what_it_can_hold(small: Make) -> None:
     config = small(backends=ALWAYS, dtypes=("float32", "bfloat16"), repeats=1)
     assert {row["dtype"] for row in rows_of(config)} == {"float32", "bfloat16"}
+
+
+@pytest.mark.skipif(native.unavailable() is not None, reason="no native kernel")
+def test_the_native_kernel_takes_part_in_bfloat16_where_the_processor_has_it(small: Make) -> None:
+    reason = native.unavailable("bfloat16")
+    config = small(dtypes=("bfloat16",), backends=("native",), repeats=1)
+    if reason is None:
+        assert {row["dtype"] for row in rows_of(config)} == {"bfloat16"}
+    else:
+        with pytest.raises(BackendUnavailableError, match="bfloat16"):
+            prepare(config)
 
 
 def wrong_state(state: Tensor, *rest: Any) -> Tensor:

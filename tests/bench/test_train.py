@@ -1,5 +1,6 @@
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -28,7 +29,7 @@ def training(tiny_smoke: Volume) -> Training:
         shortest_rollout=2,
         longest_rollout=2,
     )
-    style = resize(read_image(files("vnca.data") / "vangogh_cafe_terrace.webp"), 40, 50)
+    style = resize(read_image(Path(str(files("vnca.data") / "vangogh_cafe_terrace.webp"))), 40, 50)
     return Training(tiny_smoke, style, config, VGG16.load(), torch.device("cpu"))
 
 

@@ -1,10 +1,7 @@
 """Every backend's step of a case, in the layout that it works in."""
 
-import os
-import shutil
 from collections.abc import Callable
-from functools import partial
-from importlib.util import find_spec
+from functools import cache, partial
 from typing import NamedTuple
 
 import torch
@@ -14,6 +11,7 @@ from vnca.automaton.rule import PRIORS
 from vnca.bench.cases import CHANNELS, Case, Place
 from vnca.bench.plain import Grid, depthwise, input_order, plain_step
 from vnca.errors import BackendUnavailableError, OptionError
+from vnca.kernels.update import native
 from vnca.kernels.update.backend import choose, torch_step
 from vnca.kernels.update.reference import Weights
 from vnca.kernels.update.stencil import stencil
@@ -27,7 +25,8 @@ DTYPES = {
     "float16": torch.float16,
     "bfloat16": torch.bfloat16,
 }
-"""Of states, weights and products; `tf32` is float32 whose products may round to 10 bits."""
+"""Of states, weights and products; `tf32` is float32 whose products may round to 10 bits. The
+native kernel keeps states in float32."""
 
 
 class Contender(NamedTuple):
@@ -97,18 +96,24 @@ def _why_not(name: str, dtype: str, device: str) -> str | None:
     if name == "plain":
         return None
     if name == "compile":
-        if device != "cpu":
-            return None if find_spec("triton") else "torch.compile needs triton on a GPU"
-        compiler = os.environ.get("CXX", "g++")
-        return (
-            None if shutil.which(compiler) else f"torch.compile needs a C++ compiler ({compiler})"
-        )
+        return _why_not_compiled(device)
     try:
         choose(name, device=device)
     except BackendUnavailableError as error:
         return str(error)
-    if name == "native" and DTYPES[dtype] != torch.float32:
-        return f"the native kernel computes in float32, not in {dtype}"
+    if name != "native" or dtype == "float32":
+        return None
+    if dtype != "bfloat16":
+        return f"the native kernel computes in float32 or bfloat16, not in {dtype}"
+    return native.unavailable("bfloat16")
+
+
+@cache
+def _why_not_compiled(device: str) -> str | None:
+    try:
+        torch.compile(torch.relu)(torch.zeros(2, device=device))
+    except Exception as error:  # it needs a compiler, headers and more, and fails in many ways
+        return f"torch.compile does not work here: {str(error).strip().splitlines()[0]}"
     return None
 
 
@@ -149,7 +154,11 @@ def _plain(case: Case, place: Place, *, compiled: bool) -> Contender:
 
 def _packaged(case: Case, name: str, place: Place, *, threads: int) -> Contender:
     """A backend of vnca, on the list of living cells."""
-    update = torch_step(name, device=place.device, threads=threads)
+    precision = "float32"
+    if name == "native" and place.dtype == torch.bfloat16:
+        # It rounds the factors of its products itself; states and sums stay float32.
+        precision, place = "bfloat16", Place(place.device, torch.float32)
+    update = torch_step(name, device=place.device, threads=threads, precision=precision)
     rows, neighbours = (
         torch.from_numpy(array).to(place.device) for array in (case.rows, case.domain.neighbours)
     )
