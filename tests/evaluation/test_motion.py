@@ -6,7 +6,13 @@ import torch
 
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import GridError
-from vnca.evaluation.motion import measure_motion, transport_ratio
+from vnca.evaluation.estimators import dis
+from vnca.evaluation.motion import (
+    measure_carried_noise,
+    measure_drift,
+    measure_motion,
+    transport_ratio,
+)
 from vnca.render.sample import sample
 from vnca.typing import FloatArray
 from vnca.volume import Volume
@@ -106,3 +112,23 @@ def test_sampling_agrees_with_the_grid() -> None:
     field = torch.from_numpy(texture()[..., :1].copy())
     at = torch.tensor([[3.0, 5.0, 7.0]])
     assert sample(field, at)[0, 0] == pytest.approx(float(field[3, 5, 7, 0]), abs=1e-5)
+
+
+def test_carried_noise_moves_by_transport_and_is_seen_to(tiny_smoke: Volume) -> None:
+    velocity = np.zeros((*tiny_smoke.density.shape, 3), np.float32)
+    velocity[..., 2] = 1.0
+    smoke = dataclasses.replace(tiny_smoke, velocity=velocity)
+    measures = measure_carried_noise(random_rule(gamma=3.0), smoke, {"dis": dis()}, size=64)
+    assert measures.transport < 0.2
+    assert measures.direction["dis"] < 0.5
+
+
+def test_drifting_as_one_is_right_where_all_smoke_moves_alike(tiny_smoke: Volume) -> None:
+    rule, velocity = random_rule(gamma=3.0), np.zeros((*tiny_smoke.density.shape, 3), np.float32)
+    velocity[..., 2] = 1.0
+    together = dataclasses.replace(tiny_smoke, velocity=velocity)
+    assert measure_drift(rule, together, size=32) == pytest.approx((0, 0), abs=1e-4)
+    velocity = velocity.copy()
+    velocity[len(velocity) // 2 :] *= -1
+    apart = dataclasses.replace(tiny_smoke, velocity=velocity)
+    assert measure_drift(rule, apart, size=32)[0] > 0.5

@@ -11,12 +11,18 @@ import numpy as np
 import tyro
 
 from vnca.automaton.model import MODEL_NAME, Model
+from vnca.automaton.rule import Rule
 from vnca.cli.options import chosen, is_given, parse, say
 from vnca.cli.sequence import beside
 from vnca.cli.train import Train, train
 from vnca.errors import OptionError
 from vnca.evaluation.estimators import Estimator, dis, ours
-from vnca.evaluation.motion import MotionMeasures, measure_motion
+from vnca.evaluation.motion import (
+    MotionMeasures,
+    measure_carried_noise,
+    measure_drift,
+    measure_motion,
+)
 from vnca.files import existing_file, whole_file, writable_file
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.training.config import PRESETS, TrainConfig
@@ -107,6 +113,7 @@ def evaluate(options: Evaluate) -> None:
     print(f"the smoke moves by {measures.speed:.2f} pixels a frame where motion is measured")
     print(_heading())
     print(_row(str(options.run), [measures]))
+    _print_yardsticks(rule, smoke, options.size)
     if options.json:
         _write(options.json, as_json(measures))
 
@@ -129,6 +136,7 @@ def ablate(options: Ablation) -> None:
         writable_file(options.json)
     seen_by = estimators()
     smoke = _read(options.frame, options.smoke)
+    rules: list[Rule] = []
     found: dict[str, list[MotionMeasures]] = {}
     for variant, config in _configurations(options):
         folder = options.out / f"{variant.replace(' ', '_')}-{config.seed}"
@@ -146,11 +154,13 @@ def ablate(options: Ablation) -> None:
                     config=config,
                 )
             )
-        measures = measure_motion(Model.load(folder).rule, smoke, seen_by, size=options.size)
+        rules.append(Model.load(folder).rule)
+        measures = measure_motion(rules[-1], smoke, seen_by, size=options.size)
         found.setdefault(variant, []).append(measures)
     print(_heading())
     for variant, runs in found.items():
         print(_row(variant, runs))
+    _print_yardsticks(rules[-1], smoke, options.size)
     if options.json:
         _write(options.json, {name: [*map(as_json, runs)] for name, runs in found.items()})
 
@@ -191,6 +201,13 @@ def as_json(measures: MotionMeasures) -> dict[str, Any]:
         "motion.transport": {"value": measures.transport, "unit": "share of the change"},
         "motion.speed": {"value": measures.speed, "unit": "pixels per frame"},
     }
+
+
+def _print_yardsticks(rule: Rule, smoke: Volume, size: int) -> None:
+    """What the measures say of a texture that follows the smoke, and of one that only drifts."""
+    drift = "".join(f"{value:>12.3f}" for value in measure_drift(rule, smoke, size=size))
+    print(f"{'drifting as one':22}{drift}{drift}{'-':>12}")
+    print(_row("carried noise", [measure_carried_noise(rule, smoke, estimators(), size=size)]))
 
 
 def _heading() -> str:

@@ -3,15 +3,17 @@
 The density stays that of one frame, so that whatever moves in the pictures is texture.
 """
 
+import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import torch
+from scipy.ndimage import gaussian_filter
 from torch import Tensor
 
-from vnca.automaton.rule import Rule
+from vnca.automaton.rule import COLOUR, Rule
 from vnca.automaton.stepper import stepper
 from vnca.errors import GridError
 from vnca.evaluation.estimators import Estimator
@@ -95,12 +97,105 @@ def measure_motion(
 
     Reference: VNCA table 2 (L_dir and L_mag at a fixed density frame).
     """
+    scene = _moving_scene(rule, smoke, size)
+    config = StylizeConfig(warmup=warmup, seed=seed)
+    states = list(_states(rule, smoke, scene.box, config, frames + 1, backend))
+    return _measure(scene, smoke, states, estimators)
+
+
+def measure_carried_noise(
+    rule: Rule,
+    smoke: Volume,
+    estimators: Mapping[str, Estimator],
+    *,
+    size: int = 128,
+    frames: int = 2,
+    grain: float = 1.3,
+    seed: int = 0,
+) -> MotionMeasures:
+    """What is measured of a texture that the velocity does carry: how well motion can be seen.
+
+    No measure of a rule should be expected to be much better. Where a velocity crosses the surface
+    of the smoke, other layers of the texture come to light, which no estimator sees as motion.
+
+    Args:
+        rule: Its normalisers are used, not its weights.
+        smoke: The frame, with velocity.
+        estimators: What sees the motion, by name.
+        size: Rows and columns of the pictures.
+        frames: How often it is moved and looked at.
+        grain: Size of the noise's grains: standard deviation of a Gaussian, cells.
+        seed: Of the noise.
+
+    Raises:
+        GridError: As `measure_motion` does.
+    """
+    scene = _moving_scene(rule, smoke, size)
+    random, channels = np.random.default_rng(seed), rule.config.channels
+    noise = np.zeros((*scene.domain.box.shape, channels), np.float32)
+    for channel in range(*COLOUR.indices(channels)):
+        noise[..., channel] = gaussian_filter(random.standard_normal(noise.shape[:3]), grain)
+    noise *= 0.25 / noise[..., COLOUR].std()
+    cells = torch.from_numpy(scene.domain.cells - np.asarray(scene.domain.box.lower)).float()
+    velocity = torch.from_numpy(_velocity(scene, smoke))
+    states = []
+    for frame in range(frames + 1):
+        carried = sample(torch.from_numpy(noise), cells - frame * velocity)
+        states.append(np.concatenate([carried.numpy(), np.zeros((1, channels), np.float32)]))
+    return _measure(scene, smoke, states, estimators)
+
+
+def measure_drift(rule: Rule, smoke: Volume, *, size: int = 128) -> tuple[float, float]:
+    """L_dir and L_mag of a texture that moves as one, by the smoke's mean velocity.
+
+    A rule that is told no velocity can do this; one that does better follows the smoke.
+
+    Args:
+        rule: Its normalisers are used, not its weights.
+        smoke: The frame, with velocity.
+        size: Rows and columns of the pictures.
+
+    Raises:
+        GridError: As `measure_motion` does.
+    """
+    scene = _moving_scene(rule, smoke, size)
+    state = scene.domain.seed(rule.config.channels)
+    velocity = _velocity(scene, smoke)
+    mean = velocity[velocity.any(axis=1)].mean(axis=0)
+    assert smoke.velocity is not None
+    drifting = dataclasses.replace(smoke, velocity=np.broadcast_to(mean, smoke.velocity.shape))
+    drifting_scene = SmokeScene(drifting, rule, scene.view)
+    pairs = [_look(scene, state, state, azimuth) for azimuth in AZIMUTHS]
+    drifts = [_look(drifting_scene, state, state, azimuth).target for azimuth in AZIMUTHS]
+    motion = compare_motion(
+        torch.from_numpy(np.stack(drifts)),
+        torch.from_numpy(np.stack([pair.target for pair in pairs])),
+        torch.from_numpy(np.stack([pair.where for pair in pairs])),
+    )
+    return float(motion.direction), float(motion.magnitude)
+
+
+def _moving_scene(rule: Rule, smoke: Volume, size: int) -> SmokeScene:
     scene = SmokeScene(smoke, rule, ViewConfig(size=size))
     if smoke.velocity is None:
         raise GridError(f"frame {smoke.frame}: it has no velocity to compare motion with")
-    config = StylizeConfig(warmup=warmup, seed=seed)
-    states = list(_states(rule, smoke, scene.box, config, frames + 1, backend))
-    velocity = scene.domain.gather(smoke.velocity, smoke.origin)
+    return scene
+
+
+def _velocity(scene: SmokeScene, smoke: Volume) -> FloatArray:
+    """`[n, 3]`, cells per frame."""
+    assert smoke.velocity is not None
+    return scene.domain.gather(smoke.velocity, smoke.origin).astype(np.float32)
+
+
+def _measure(
+    scene: SmokeScene,
+    smoke: Volume,
+    states: Sequence[FloatArray],
+    estimators: Mapping[str, Estimator],
+) -> MotionMeasures:
+    """How states a frame apart move."""
+    velocity = _velocity(scene, smoke)
     pairs = [
         _look(scene, before, after, azimuth)
         for before, after in pairwise(states)
