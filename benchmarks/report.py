@@ -233,7 +233,7 @@ def main() -> None:
         "stylize": seconds_table(
             stylize,
             ("device", "threads", "grid", "frames", "cells", "steps", "hidden"),
-            ("backend", "files", "frames_per_second", *spread),
+            ("backend", "dtype", "files", "frames_per_second", *spread),
         ),
     }
     path = options.docs / "kernels.md"

@@ -12,6 +12,7 @@ from vnca.bench.stylize import PaintedSequence, available, measure_stylizing, ra
 from vnca.errors import DisagreementError
 from vnca.io.sequence import find_frames
 from vnca.io.smoke import SmokeFormat, write_smoke
+from vnca.kernels.update import native
 from vnca.volume import Volume
 
 
@@ -43,6 +44,19 @@ def test_computing_and_files_are_timed_in_every_backend(
     assert sorted(tmp_path.iterdir()) == before
 
 
+@pytest.mark.skipif(native.unavailable("bfloat16") is not None, reason="no bfloat16")
+def test_the_native_kernel_paints_in_bfloat16_and_the_reference_does_not(
+    painted: PaintedSequence,
+) -> None:
+    rows = measure_stylizing(
+        painted, ("native", "reference"), threads=1, repeats=1, precision="bfloat16"
+    )
+    assert {row["backend"]: row["dtype"] for row in rows} == {
+        "native": "bfloat16",
+        "reference": "float32",
+    }
+
+
 def test_nothing_is_timed_when_a_backend_paints_something_else(
     painted: PaintedSequence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -61,7 +75,7 @@ def test_nothing_is_timed_when_a_backend_paints_something_else(
 
 
 def test_a_random_rule_changes_what_it_sees(painted: PaintedSequence) -> None:
-    roll = painted.roll("reference", 1)
+    roll = painted.roll("reference", 1, "float32")
     values = roll.paint(painted.volumes[0], roll.start()).state.values
     assert np.isfinite(values).all()
     assert np.abs(values[:-1]).max() > 1e-3

@@ -23,7 +23,8 @@ from vnca.cli.options import say
 from vnca.cli.sequence import open_sequence
 from vnca.errors import OptionError
 from vnca.io.smoke import SmokeFormat, with_fitted_scale
-from vnca.kernels.update.native import default_threads
+from vnca.kernels.update.backend import array_step
+from vnca.kernels.update.native import Precision, default_threads
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,8 @@ class BenchStylize:
     """Steps of the automaton in each frame; the rule's own unless given."""
     backends: tuple[str, ...] = ()
     """Of native and reference; all that can run here unless given."""
+    precision: Precision = "float32"
+    """What the native kernel rounds the factors of its products to."""
     threads: int = default_threads()
     """Of the native kernel; as many as there are cores unless given."""
     repeats: int = 3
@@ -87,13 +90,17 @@ def bench_stylize(options: BenchStylize) -> None:
         VncaError: If something cannot be measured or written, or backends disagree.
     """
     require_writable(options.json, options.csv)
+    backends = options.backends or available()
+    for name in backends:  # what cannot run is refused before smoke is simulated
+        array_step(name, precision=options.precision if name == "native" else "float32")
     facts = run_facts("cpu", options.threads)
     with tempfile.TemporaryDirectory() as folder:
         rows = measure_stylizing(
             _painted(options, Path(folder)),
-            options.backends or available(),
+            backends,
             threads=options.threads,
             repeats=options.repeats,
+            precision=options.precision,
         )
     print("{device}, {threads} threads, vnca {vnca}".format(**facts))
     print("\n".join(_table(rows)))
@@ -119,7 +126,7 @@ def _table(rows: Rows) -> list[str]:
         f"{first['frames']} frames in {first['grid']} cells, {first['cells']} alive, "
         f"{first['steps']} steps a frame, hidden {first['hidden']}",
         "all agree on the first frame",
-        f"{'backend':10}{'':12}{'seconds a frame (min to max)':>32}{'frames/s':>10}"
+        f"{'backend':10}{'dtype':10}{'':12}{'seconds a frame (min to max)':>32}{'frames/s':>10}"
         f"{'ns a cell and step':>20}{'MB':>8}{'against reference':>19}",
     ]
     slow = {row["files"]: row["seconds"] for row in rows if row["backend"] == "reference"}
@@ -128,7 +135,7 @@ def _table(rows: Rows) -> list[str]:
         gain = f"{slow[row['files']] / row['seconds']:.1f}×" if slow else ""
         what = "with files" if row["files"] else "computing"
         lines.append(
-            f"{row['backend']:10}{what:12}{short(row['seconds']):>10} {spread:>21}"
+            f"{row['backend']:10}{row['dtype']:10}{what:12}{short(row['seconds']):>10} {spread:>21}"
             f"{short(row['frames_per_second']):>10}{short(row['ns_per_cell']):>20}"
             f"{short(row['peak_mb']):>8}{gain:>19}"
         )
