@@ -224,6 +224,7 @@ def test_other_mistakes_end_in_one_line_too(
         (("train", style, "--out", tmp_path / "r", "--block", 4), "--block 4"),
         (("train", style, "--out", tmp_path / "r", "--preview-every", 0), "--preview-every"),
         (("train", style, "--out", tmp_path / "r", "--density-prior"), "--density-prior"),
+        (("train", style, "--out", tmp_path / "r", "--memory-budget", "1MB"), "at least"),
         (("train", style, "--out", tmp_path / "r", "--mesh", style), "expected a mesh"),
     ):
         assert line in vnca("texture", *arguments).complaint

@@ -145,6 +145,15 @@ def test_views_can_be_chosen(trained: Run) -> None:
     assert view["azimuths"] == [0.0, 90.0]
 
 
+@pytest.mark.parametrize(("budget", "line"), [("1MB", "at least"), ("much", "expected auto")])
+def test_a_memory_budget_that_cannot_be_met_is_one_line(
+    vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path, budget: str, line: str
+) -> None:
+    options = [*tiny, "--memory-budget", budget]
+    assert line in vnca("train", frame, style, "--out", tmp_path / "run", *options).complaint
+    assert not (tmp_path / "run").exists()
+
+
 def test_interrupted_training_leaves_a_usable_model(
     vnca: Vnca,
     frame: Path,

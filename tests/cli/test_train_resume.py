@@ -216,10 +216,19 @@ def test_out_of_memory_while_training_is_one_line_and_loses_nothing(
     assert "Traceback" not in outcome.err
     *_, complaint = outcome.err.splitlines()
     assert complaint.startswith("vnca: out of memory in iteration 3: for 1328 cells")
-    assert "--view.size 32 about 7 MB" in complaint
+    assert "--view.size 32 about 8 MB" in complaint
+    assert f"with a --memory-budget: vnca train --resume {run}" in complaint
     assert Model.load(run).training["iterations"] == 2
     assert vnca("train", "--resume", run).code == 0
     assert contents(run) == contents(whole)
+
+
+def test_a_training_goes_on_with_another_memory_budget(vnca: Vnca, begin: Begin) -> None:
+    whole, run = begin("whole"), begin("run", KeyboardInterrupt)
+    resume = ("train", "--resume", run, "--memory-budget")
+    assert "--memory-budget 1 MB: at least" in vnca(*resume, "1MB").complaint
+    assert vnca(*resume, "100GB").code == 0
+    assert (run / MODEL_NAME).read_bytes() == (whole / MODEL_NAME).read_bytes()
 
 
 def test_out_of_memory_before_training_is_one_line(

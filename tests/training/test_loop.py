@@ -167,6 +167,16 @@ def test_the_native_kernel_and_the_reference_learn_alike(trainer: Make) -> None:
         np.testing.assert_allclose(ours, theirs, atol=2e-4)
 
 
+@pytest.mark.parametrize("backend", ["native", "reference"])
+def test_states_that_are_computed_again_change_nothing(trainer: Make, backend: str) -> None:
+    plain, frugal = (
+        trainer(shortest_rollout=6, longest_rollout=9, backend=backend) for _ in range(2)
+    )
+    frugal.kept_states = 5
+    assert [step.loss for step in plain.run()] == [step.loss for step in frugal.run()]
+    assert same(plain, frugal)
+
+
 def test_smoke_of_any_units_gives_the_same_rule(
     tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
 ) -> None:

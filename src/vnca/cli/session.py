@@ -119,10 +119,10 @@ class Session:
             trainer.undo()
             self._keep()
             self._save()
-            advice = memory_advice(len(trainer.scene.domain), trainer.config)
+            advice = memory_advice(trainer.scene, trainer.config, trainer.kept_states)
             raise OutOfMemoryError(
                 f"out of memory in iteration {trainer.iteration + 1}: {advice}; to go on from here "
-                f"when more is free: {self._call}"
+                f"when more is free, or with a --memory-budget: {self._call}"
             ) from None
         self._show()
         folder.finish()

@@ -28,6 +28,7 @@ from vnca.io.orientation import UpAxis
 from vnca.texturing.config import PRESETS, TextureConfig
 from vnca.texturing.training import texture_trainer
 from vnca.training.checkpoint import Checkpoint, fingerprints
+from vnca.training.memory import memory_budget
 from vnca.typing import AnyArray
 
 COMMAND = "texture train"
@@ -56,12 +57,16 @@ class TrainTexture:
     """Iterations between preview pictures, at which the model is saved too."""
     device: str = "auto"
     """Where to compute: auto, cpu or cuda."""
+    memory_budget: str = "auto"
+    """Memory for the program, such as 12GB (on a GPU: of the GPU): what does not fit of a rollout
+    is computed again, with the same result. auto takes what is free."""
     config: Annotated[TextureConfig, tyro.conf.arg(name="")] = field(default_factory=TextureConfig)
     """Hyperparameters."""
 
     def __post_init__(self) -> None:
         if self.preview_every < 1:
             raise OptionError(f"--preview-every {self.preview_every}: at least 1 is needed")
+        memory_budget(self.memory_budget)
 
 
 @dataclass(frozen=True)
@@ -70,6 +75,8 @@ class ResumeTexture:
 
     resume: Path
     """Folder of the run. All that was asked for when it began holds."""
+    memory_budget: str | None = None
+    """Memory for the program from now on, such as 12GB or auto."""
     style: Path | None = None
     """The picture, if it is no longer where it was."""
     mesh: Path | None = None
@@ -102,7 +109,10 @@ def train(options: TrainTexture, checkpoint: Checkpoint | None = None) -> Path:
     torch.use_deterministic_algorithms(True)
     vgg = VGG16.load(config.features, device)
     with fitting(config, "this block"):
-        trainer = texture_trainer(style, config, vgg, mesh=mesh, device=device)
+        budget = memory_budget(options.memory_budget)
+        trainer = texture_trainer(
+            style, config, vgg, mesh=mesh, device=device, memory_budget=budget
+        )
     training = {
         "kind": KIND,
         "style": options.style.name,
@@ -139,6 +149,7 @@ def resume(options: ResumeTexture) -> Path:
         again = dataclasses.replace(
             begun,
             out=options.resume,
+            memory_budget=options.memory_budget or begun.memory_budget,
             style=options.style or begun.style,
             mesh=options.mesh or begun.mesh,
         )

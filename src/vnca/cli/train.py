@@ -26,6 +26,7 @@ from vnca.io.image import read_image
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.training.checkpoint import Checkpoint, fingerprints
 from vnca.training.config import PRESETS, TrainConfig
+from vnca.training.memory import memory_budget
 from vnca.training.smoke import smoke_trainer
 
 COMMAND = "train"
@@ -52,6 +53,9 @@ class Train:
     """Iterations between preview pictures, at which the model is saved too."""
     device: str = "auto"
     """Where to compute: auto, cpu or cuda."""
+    memory_budget: str = "auto"
+    """Memory for the program, such as 12GB (on a GPU: of the GPU): what does not fit of a rollout
+    is computed again, with the same result. auto takes what is free."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=TrainConfig)
@@ -60,6 +64,7 @@ class Train:
     def __post_init__(self) -> None:
         if self.preview_every < 1:
             raise OptionError(f"--preview-every {self.preview_every}: at least 1 is needed")
+        memory_budget(self.memory_budget)
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,8 @@ class Resume:
 
     resume: Path
     """Folder of the run. All that was asked for when it began holds."""
+    memory_budget: str | None = None
+    """Memory for the program from now on, such as 12GB or auto."""
     frame: Path | None = None
     """The frame, if it is no longer where it was."""
     style: Path | None = None
@@ -107,7 +114,8 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
     torch.use_deterministic_algorithms(True)
     vgg = VGG16.load(config.features, device)
     with fitting(config, "this frame"):
-        trainer = smoke_trainer(smoke, style, config, vgg, device=device)
+        budget = memory_budget(options.memory_budget)
+        trainer = smoke_trainer(smoke, style, config, vgg, device=device, memory_budget=budget)
     training = {
         "frame": options.frame.name,
         "style": options.style.name,
@@ -151,6 +159,7 @@ def resume(options: Resume) -> Path:
         again = dataclasses.replace(
             begun,
             out=options.resume,
+            memory_budget=options.memory_budget or begun.memory_budget,
             frame=options.frame or begun.frame,
             style=options.style or begun.style,
         )

@@ -24,6 +24,7 @@ def texture_trainer(
     *,
     mesh: Mesh | None = None,
     device: torch.device | str = "cpu",
+    memory_budget: int | None = None,
 ) -> Trainer:
     """What trains a rule to grow blocks that look like a picture wherever they are cut.
 
@@ -33,9 +34,14 @@ def texture_trainer(
         vgg: The frozen network that judges pictures.
         mesh: Looked at beside the slices.
         device: Where to compute.
+        memory_budget: Bytes that the program may take; see `Trainer`.
+
+    Raises:
+        OptionError: If the memory budget is not enough.
     """
     scene = BlockScene(config.block, config.slices, mesh=mesh, device=device)
-    return Trainer(scene, initial_rule(config), style, config, vgg)
+    rule = initial_rule(config)
+    return Trainer(scene, rule, style, config, vgg, memory_budget=memory_budget)
 
 
 def initial_rule(config: TextureConfig) -> Rule:

@@ -4,7 +4,7 @@ Reference: VNCA sections 3.4 and 5.
 """
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,8 +23,10 @@ from vnca.losses.appearance import AppearanceLoss
 from vnca.losses.overflow import overflow
 from vnca.training.course import CourseConfig
 from vnca.training.descent import MOST_RETREATS, Descent
+from vnca.training.memory import states_to_keep
 from vnca.training.motion import MotionSupervision
 from vnca.training.pool import Pool
+from vnca.training.rollout import roll_out
 from vnca.training.scene import Scene
 from vnca.training.snapshot import Snapshot, count
 from vnca.typing import FloatArray
@@ -60,6 +62,7 @@ class Trainer:
         step: What computes the automaton, called as `vnca.kernels.update.reference.update` is;
             another that does the same may take its place.
         iteration: Iterations done.
+        kept_states: How many states of a rollout are kept at a time, at most.
     """
 
     def __init__(
@@ -71,6 +74,7 @@ class Trainer:
         vgg: VGG16,
         *,
         motion: MotionSupervision | None = None,
+        memory_budget: int | None = None,
     ) -> None:
         """Prepare training.
 
@@ -81,6 +85,11 @@ class Trainer:
             config: The hyperparameters.
             vgg: The frozen network that judges pictures.
             motion: What judges how they move, if anything does.
+            memory_budget: Bytes that the program may take: rollouts keep as few states as that
+                asks for, and compute the others again. The result is the same to the bit.
+
+        Raises:
+            OptionError: If the budget is not enough.
         """
         self.config, self.scene = config, scene
         self.iteration = 0
@@ -109,6 +118,7 @@ class Trainer:
         self._descent = Descent(self._weights)
         self._steps = 0  # of all rollouts: no two share a mask
         self._before: dict[str, Snapshot] | None = None  # the iteration that is under way
+        self.kept_states = states_to_keep(scene, config, memory_budget)
 
     @property
     def teaches_motion(self) -> bool:
@@ -234,24 +244,25 @@ class Trainer:
         with torch.no_grad():
             return self._roll(self.scene.seed(self.config.rule.channels), range(steps))
 
-    def _roll(self, state: Tensor, steps: Iterable[int]) -> Tensor:
+    def _roll(self, state: Tensor, steps: range) -> Tensor:
         """The state after the numbered steps of the rule; differentiable in the weights."""
-        for step in steps:
-            rows = changing_rows(
-                self.scene.domain.hashes,
-                seed=self.config.seed,
-                step=step,
-                probability=self.config.rule.update_probability,
-            )
-            state = self.step(
-                state,
-                torch.from_numpy(rows).to(state.device),
-                self.scene.neighbours,
-                self.scene.priors,
-                self._weights,
-                self._stencil,
-            )
-        return state
+        return roll_out(self._advance, state, steps, kept_states=self.kept_states)
+
+    def _advance(self, state: Tensor, step: int) -> Tensor:
+        rows = changing_rows(
+            self.scene.domain.hashes,
+            seed=self.config.seed,
+            step=step,
+            probability=self.config.rule.update_probability,
+        )
+        return self.step(
+            state,
+            torch.from_numpy(rows).to(state.device),
+            self.scene.neighbours,
+            self.scene.priors,
+            self._weights,
+            self._stencil,
+        )
 
     def rule(self) -> Rule:
         """The rule as it is now."""

@@ -21,10 +21,12 @@ class Scene(ABC, Generic[Sight]):
         domain: The cells that live.
         neighbours: `[27, n]` rows of the state around each cell.
         priors: `[n, 7]`.
+        samples: About how many are taken along the ray of a pixel.
         paints_density: Whether a rule may change the density. If not, its weights that would do
             so are never trained.
     """
 
+    samples = 1.0
     paints_density = True
 
     def __init__(self, domain: Domain, priors: FloatArray, device: torch.device | str) -> None:

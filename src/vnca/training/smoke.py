@@ -21,6 +21,7 @@ def smoke_trainer(
     vgg: VGG16,
     *,
     device: torch.device | str = "cpu",
+    memory_budget: int | None = None,
 ) -> Trainer:
     """What trains a rule on one frame and one picture.
 
@@ -30,16 +31,18 @@ def smoke_trainer(
         config: The hyperparameters.
         vgg: The frozen network that judges pictures.
         device: Where to compute.
+        memory_budget: Bytes that the program may take; see `Trainer`.
 
     Raises:
         GridError: If there is no smoke in the frame.
+        OptionError: If the memory budget is not enough.
     """
     rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
     scene = SmokeScene(smoke, rule, config.view, device=device)
     motion = None
     if config.motion.weight and scene.moves:
         motion = MotionSupervision(config.motion, FlowNetwork.load(device), scene)
-    return Trainer(scene, rule, style, config, vgg, motion=motion)
+    return Trainer(scene, rule, style, config, vgg, motion=motion, memory_budget=memory_budget)
 
 
 def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:

@@ -82,6 +82,7 @@ class SmokeScene(Scene[SmokeSight]):
                 box=box,
             )
         super().__init__(domain, priors(domain, smoke, rule), device)
+        self.samples = max(domain.box.shape) / view.step
         self.gamma = rule.scales.gamma
         density = domain.gather(smoke.density, smoke.origin) / rule.scales.density
         self._density = torch.from_numpy(density.astype(np.float32)).to(device)
