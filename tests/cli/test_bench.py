@@ -94,6 +94,7 @@ def test_no_speed_up_is_told_of_backends_that_disagree(
         (("train", "--rollout", "0"), "--rollout 0"),
         (("train", "--view-size", "3"), "--view.size 3"),
         (("train", "--frame", "none.vdb"), "none.vdb"),
+        (("train", "--memory-budget", "much"), "--memory-budget much"),
         (("stylize", "--model", "none"), "--sequence"),
         (("stylize", "--backends", "triton"), "--backends triton"),
         (("stylize", "--length", "0"), "--length 0"),

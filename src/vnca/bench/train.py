@@ -44,6 +44,7 @@ class Training:
         config: The hyperparameters.
         vgg: The frozen network.
         device: Where to compute.
+        memory_budget: Bytes that the program may take, as a trainer has it.
     """
 
     smoke: Volume
@@ -51,6 +52,7 @@ class Training:
     config: TrainConfig
     vgg: VGG16
     device: torch.device
+    memory_budget: int | None = None
 
     def trainer(self, backend: str) -> Trainer:
         """A rule in training with one backend.
@@ -63,7 +65,14 @@ class Training:
             backend="reference" if backend in PLAIN else backend,
             pool=replace(self.config.pool, size=1, reseed_every=_NEVER),
         )
-        trainer = smoke_trainer(self.smoke, self.style, config, self.vgg, device=self.device)
+        trainer = smoke_trainer(
+            self.smoke,
+            self.style,
+            config,
+            self.vgg,
+            device=self.device,
+            memory_budget=self.memory_budget,
+        )
         if backend in PLAIN:
             compiled = backend == "compile"
             trainer.step = PlainUpdate(trainer.scene.domain, self.device, compiled=compiled)
@@ -108,6 +117,7 @@ def measure_training(
                 "hidden": config.rule.hidden,
                 "rollout": config.longest_rollout,
                 "view": config.view.size,
+                "kept_states": min(trainer.kept_states, config.longest_rollout),
                 "seconds_min": round(spread.least, 4),
                 "seconds": round(spread.median, 4),
                 "seconds_max": round(spread.most, 4),

@@ -24,6 +24,7 @@ from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.kernels.update.native import default_threads
 from vnca.simulate.scenes import simulate
 from vnca.training.config import PRESETS, TrainConfig
+from vnca.training.memory import memory_budget
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
@@ -57,6 +58,8 @@ class BenchTrain:
     """Of plain, compile, reference, native and triton; all that can run here unless given."""
     device: str = "auto"
     """Where to train: auto, cpu or cuda."""
+    memory_budget: str = "auto"
+    """As of `vnca train`; with a size, name one backend: all that take part share it."""
     threads: int = default_threads()
     """Of the CPU; as many as it has cores unless given."""
     repeats: int = 5
@@ -69,6 +72,7 @@ class BenchTrain:
     """How smoke is read from files."""
 
     def __post_init__(self) -> None:
+        memory_budget(self.memory_budget)
         for name in ("hidden", "rollout", "threads", "repeats"):
             value = getattr(self, name)
             if value is not None and value < 1:
@@ -106,7 +110,8 @@ def bench_train(options: BenchTrain) -> None:
     torch.set_num_threads(options.threads)
     facts = run_facts(device.type, options.threads)
     vgg = VGG16.load(config.features, device)
-    training = Training(_smoke(options), _style(options), config, vgg, device)
+    budget = memory_budget(options.memory_budget)
+    training = Training(_smoke(options), _style(options), config, vgg, device, budget)
     rows = measure_training(
         training,
         options.backends or available("float32", device.type),
