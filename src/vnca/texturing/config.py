@@ -8,6 +8,7 @@ import tyro
 
 from vnca.automaton.rule import RuleConfig
 from vnca.errors import OptionError
+from vnca.losses.appearance import AppearanceConfig
 from vnca.texturing.block import LARGEST, SMALLEST
 from vnca.training.course import CourseConfig, Pictures, PoolConfig
 
@@ -16,7 +17,7 @@ from vnca.training.course import CourseConfig, Pictures, PoolConfig
 class SliceConfig:
     """How the block is looked at while training."""
 
-    size: int = 128
+    size: int = 64
     """Rows and columns of a slice, pixels: cells, but for the zoom."""
     count: int = 2
     """Slices in an iteration."""
@@ -39,8 +40,14 @@ class SliceConfig:
             raise OptionError(f"--slice.zoom {self.zoom}: must be from 1 to 4")
 
 
-# A texture is the same everywhere and follows nothing.
-_PLAIN = RuleConfig(position_prior=False, density_prior=False, velocity_prior=False)
+# A texture is the same everywhere and follows nothing. Only gradients tell a cell where in a
+# pattern it is: they are perceived four times as strongly as in smoke.
+_PLAIN = RuleConfig(
+    sobel_divisor=8, position_prior=False, density_prior=False, velocity_prior=False
+)
+# No density is to be shaped by a picture in grey. Slices are small, for speed; the picture is
+# larger, for its patterns to be as large as they can be in a block.
+_COLOURS = AppearanceConfig(grey=False, style_scale=1.5, samples=512)
 
 
 @dataclass(frozen=True)
@@ -48,12 +55,15 @@ class TextureConfig(CourseConfig):
     """How a rule for a solid texture is trained."""
 
     rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = _PLAIN
+    appearance: AppearanceConfig = _COLOURS
     pool: PoolConfig = field(default_factory=lambda: PoolConfig(size=16))
-    learning_rate: float = 1e-3
+    iterations: int = 1500
+    """Iterations of training: patterns come late, colours early."""
+    learning_rate: float = 2e-3
     """Adam's learning rate at its highest. Nothing from outside holds a texture's states: at the
     rates that suit smoke, many explode."""
     slices: Annotated[SliceConfig, tyro.conf.arg(name="slice")] = field(default_factory=SliceConfig)
-    block: int = 48
+    block: int = 32
     """Cells along an edge of the block that is trained on; patterns are smaller than it."""
 
     def __post_init__(self) -> None:
@@ -76,10 +86,10 @@ PRESETS = {
     "draft": TextureConfig(),
     "standard": TextureConfig(
         rule=dataclasses.replace(_PLAIN, hidden=128),
-        slices=SliceConfig(size=192),
+        slices=SliceConfig(size=128),
         pool=PoolConfig(size=64),
         block=64,
-        iterations=3000,
+        iterations=6000,
         shortest_rollout=12,
         longest_rollout=48,
     ),
