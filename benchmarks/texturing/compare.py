@@ -31,7 +31,7 @@ from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image
-from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
+from vnca.losses.appearance import AppearanceLoss
 from vnca.texturing.block import border_jump, grow
 from vnca.texturing.config import PRESETS
 from vnca.texturing.distance import slice_distances
@@ -63,6 +63,10 @@ class Task:
     def slice_size(self) -> int:
         """Rows and columns of a slice."""
         return PRESETS[self.preset].slices.size
+
+    def judge(self, style: FloatArray, vgg: VGG16) -> AppearanceLoss:
+        """What the rule was trained with, for both methods."""
+        return AppearanceLoss(vgg, style, PRESETS[self.preset].appearance, self.slice_size)
 
     def begin(self) -> tuple[FloatArray, VGG16]:
         """The picture and the network, in the process that measures."""
@@ -111,7 +115,7 @@ def grown(task: Task, rule: Rule, size: int) -> dict[str, Any]:
 def optimised(task: Task, size: int) -> dict[str, Any]:
     """A block of the baseline, and how near its slices come."""
     style, vgg = task.begin()
-    appearance = AppearanceLoss(vgg, style, AppearanceConfig(), task.slice_size)
+    appearance = task.judge(style, vgg)
     blocks = optimised_blocks(style, appearance, size, slice_size=task.slice_size, seed=task.seed)
     began = time.perf_counter()
     for iterations, block in zip(count(1), blocks, strict=False):  # noqa: B007
@@ -128,8 +132,9 @@ def optimised(task: Task, size: int) -> dict[str, Any]:
 
 
 def judged(task: Task, block: FloatArray, style: FloatArray, vgg: VGG16) -> dict[str, Any]:
-    appearance = AppearanceLoss(vgg, style, AppearanceConfig(), task.slice_size)
-    found = slice_distances(block, appearance, size=task.slice_size, count=task.slices, seed=1)
+    found = slice_distances(
+        block, task.judge(style, vgg), size=task.slice_size, count=task.slices, seed=1
+    )
     totals = {name: distance.total for name, distance in found.items()}
     seen = (totals["axis"] + totals["oblique"]) / 2
     return {
@@ -158,7 +163,9 @@ def main() -> None:
     parser.add_argument(
         "--runs", type=Path, nargs="+", metavar="RUN", help="one a picture, instead of training"
     )
-    parser.add_argument("--sizes", type=int, nargs="+", default=[64, 128])
+    parser.add_argument(
+        "--sizes", type=int, nargs="*", default=[64, 128], help="of blocks by both methods"
+    )
     parser.add_argument(
         "--grow", type=int, nargs="*", default=[256], help="further sizes for the rule alone"
     )
