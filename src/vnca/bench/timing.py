@@ -10,6 +10,9 @@ Begin = Callable[[], Callable[[], object]]
 """Makes work ready, and returns what is timed."""
 CALLS = 12
 """In a row on a GPU, so that launching is hidden behind the call before, as in a rollout."""
+LEAST_SECONDS = 0.1
+"""On a CPU calls are made in a row for so long: a core that has slept takes milliseconds to be as
+fast as before, which in a rollout happens once."""
 
 
 class Spread(NamedTuple):
@@ -35,13 +38,17 @@ def in_turns(works: Mapping[K, Begin], device: str, repeats: int) -> dict[K, lis
 
 
 def seconds(begin: Begin, device: str) -> float:
-    """Seconds of one call; on a GPU by its own clock, the mean of a dozen calls in a row."""
+    """Seconds of a call, the mean of some in a row; on a GPU by its own clock."""
     if device == "cpu":
-        work = begin()
         time.sleep(0.05)  # torch's threads spin for a while after their work, in others' way
-        start = time.perf_counter()
-        work()
-        return time.perf_counter() - start
+        total, calls = 0.0, 0
+        while total < LEAST_SECONDS:
+            work = begin()
+            start = time.perf_counter()
+            work()
+            total += time.perf_counter() - start
+            calls += 1
+        return total / calls
     import torch
 
     events = []
