@@ -145,7 +145,7 @@ def assert_close_to_bfloat16(got: dict[str, AnyArray], expected: dict[str, AnyAr
 
 
 CASES = {
-    "paper": {"shape": (33, 8, 25), "hidden": 128, "occupancy": 0.8},
+    "paper": {"shape": (33, 8, 65), "hidden": 128, "occupancy": 0.8},
     "default": {"shape": (16, 17, 12), "hidden": 96},
     "one cell": {"shape": (1, 1, 1), "channels": 5, "hidden": 17, "priors": 0, "probability": 1},
     "one row of cells": {"shape": (1, 1, 65), "channels": 1, "hidden": 1, "priors": 1},
@@ -158,6 +158,8 @@ CASES = {
     "wide": {"shape": (5, 6, 7), "channels": 64, "hidden": 512, "priors": 16},
     "many channels": {"channels": 20, "hidden": 100, "priors": 2},
     "single brick": {"shape": (8, 8, 8), "hidden": 32},
+    "all bricks": {"shape": (16, 8, 16), "hidden": 16},
+    "7×9×11": {"shape": (7, 9, 11), "hidden": 96},
 }  # fmt: skip
 
 
@@ -175,6 +177,43 @@ def test_a_step_and_all_its_gradients_agree_with_the_reference(case: str, backen
         got = {"state": p.forward(**options), **dict(gradients)}
         short = options["precision"] == "bfloat16"
         (assert_close_to_bfloat16 if short else assert_conforms)(got, exact)
+
+
+def joined(first: Problem, second: Problem) -> Problem:
+    """Two grids that do not touch, in one list: a batch."""
+    n, m = len(first.priors), len(second.priors)
+    outside = n + m
+    moved = second.neighbours + n  # what was m, nothing, becomes n + m by itself
+    kept = np.where(first.neighbours == n, outside, first.neighbours)
+    return first.with_(
+        state=np.concatenate([first.state[:-1], second.state]),
+        rows=np.concatenate([first.rows, second.rows + n]).astype(np.int32),
+        neighbours=np.concatenate([kept, moved], axis=1).astype(np.int32),
+        priors=np.concatenate([first.priors, second.priors]),
+        gradient=np.concatenate([first.gradient[:-1], second.gradient]),
+    )
+
+
+@pytest.mark.parametrize("backend", ["reference", *KERNELS])
+def test_grids_in_one_batch_change_as_each_does_alone(backend: str) -> None:
+    alone = [problem((7, 9, 11), occupancy=0.6), problem((33, 4, 5))]
+    alone[1] = alone[1].with_(hidden=alone[0].hidden, bias=alone[0].bias, output=alone[0].output)
+    batch, n = joined(*alone), len(alone[0].priors)
+    if backend == "reference":
+        got, each = (
+            [run(reference.update, p, torch.float32) for p in ps] for ps in ([batch], alone)
+        )
+        state, to_state, *to_weights = got[0].values()
+        parts = [[*values.values()] for values in each]
+    else:
+        options = KERNELS[backend]
+        state, (to_state, *to_weights) = batch.forward(**options), batch.backward(**options)
+        parts = [[p.forward(**options), *p.backward(**options)] for p in alone]
+    np.testing.assert_array_equal(state, np.concatenate([parts[0][0][:-1], parts[1][0]]))
+    for got_part, exact in ((to_state[:n], parts[0][1][:-1]), (to_state[n:], parts[1][1])):
+        np.testing.assert_allclose(got_part, exact, atol=1e-4 * np.abs(exact).max())
+    for together, one, other in zip(to_weights, parts[0][2:], parts[1][2:], strict=True):
+        np.testing.assert_allclose(together, one + other, atol=1e-4 * np.abs(together).max())
 
 
 TRITON_CASES = {
