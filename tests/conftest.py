@@ -3,14 +3,19 @@
 import os
 from collections.abc import Iterator
 
+# Before torch is imported. On a busy machine more threads wait for each other.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
+import torch
 from jaxtyping import config, install_import_hook
 
 from vnca.volume import Volume
 
-# Before torch is imported. On a busy machine more threads wait for each other.
-os.environ.setdefault("OMP_NUM_THREADS", "1")
+# Before Triton is imported. Without an NVIDIA GPU its kernels run in its interpreter, on the CPU.
+if not torch.cuda.is_available():
+    os.environ.setdefault("TRITON_INTERPRET", "1")
 
 # Shapes written in signatures are checked in tests, and only there.
 install_import_hook(["vnca.render", "vnca.losses", "vnca.features"], "beartype.beartype")
