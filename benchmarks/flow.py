@@ -13,12 +13,9 @@ translations best.
 """
 
 import argparse
-import csv
-import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import datetime, timezone
 from functools import cache
 from itertools import product
 from math import pi
@@ -32,7 +29,8 @@ from torch.nn import functional
 
 import vnca
 from msoe import published
-from vnca.bench.machine import device_name
+from vnca.bench.machine import run_facts
+from vnca.bench.records import append_csv, write_json
 from vnca.camera import frame_box
 from vnca.errors import VncaError
 from vnca.evaluation.estimators import Estimator, dis, estimator_of, farneback
@@ -58,10 +56,6 @@ SIDE, TEXTURE_SIDE, CONTRAST = 128, 192, 0.18
 SEED = 20260101
 PAINTING = Path(vnca.__file__).parent / "data" / "vangogh_cafe_terrace.webp"
 PLUME = Path(__file__).parents[1] / "tests" / "data" / "plume_sphere_0030.vdb"
-COLUMNS: list[str] = [
-    *("date", "device", "threads", "torch", "vnca", "estimator"),
-    *("pictures", "replaced", "speed", "endpoint_error", "cosine_distance"),
-]
 
 
 @dataclass(frozen=True)
@@ -226,14 +220,8 @@ def main() -> None:
     parser.add_argument("--csv", type=Path, metavar="FILE", help="append the rows to this")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
-    run = {
-        "date": datetime.now(timezone.utc).date().isoformat(),
-        "device": device_name("cpu"),
-        "threads": options.threads,
-        "torch": torch.__version__,
-        "vnca": vnca.__version__,
-    }
-    print(f"{run['device']}, {options.threads} threads, torch {run['torch']}, vnca {run['vnca']}")
+    facts = run_facts("cpu", options.threads)
+    print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
     try:
         network = FlowNetwork.read(options.weights) if options.weights else FlowNetwork.load()
         estimators = {"ours": estimator_of(network.eval())}
@@ -248,17 +236,10 @@ def main() -> None:
     print(f"forward and backward at 96×96: {time_of(network):.3f} s\n")
     rows = list(measure(estimators, options.pairs))
 
-    for path in filter(None, (options.json, options.csv)):
-        path.parent.mkdir(parents=True, exist_ok=True)
     if options.json is not None:
-        options.json.write_text(json.dumps({**run, "rows": rows}, indent=2) + "\n")
+        write_json(options.json, facts, rows)
     if options.csv is not None:
-        begun = options.csv.exists()
-        with options.csv.open("a", newline="") as file:
-            table = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
-            if not begun:
-                table.writeheader()
-            table.writerows({**run, **row} for row in rows)
+        append_csv(options.csv, facts, rows)
 
 
 def measure(estimators: Mapping[str, Estimator], count: int) -> Iterator[dict[str, Any]]:

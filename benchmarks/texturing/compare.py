@@ -8,15 +8,11 @@ in a process of its own, whose peak memory is told, the libraries included.
 """
 
 import argparse
-import csv
-import json
-import platform
 import resource
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from datetime import datetime, timezone
 from itertools import count
 from multiprocessing import get_context
 from pathlib import Path
@@ -25,10 +21,11 @@ from typing import Any
 import torch
 from solid import optimised_blocks
 
-import vnca
 from vnca.automaton.model import Model
 from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
+from vnca.bench.machine import run_facts
+from vnca.bench.records import append_csv, write_json
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image
 from vnca.losses.appearance import AppearanceLoss
@@ -37,12 +34,6 @@ from vnca.texturing.config import PRESETS
 from vnca.texturing.distance import slice_distances
 from vnca.texturing.training import texture_trainer
 from vnca.typing import FloatArray
-
-COLUMNS = (
-    "date", "device", "threads", "torch", "vnca", "features", "style", "method", "size",
-    "iterations", "learn_s", "make_s", "peak_mb", "axis", "oblique", "unseen", "unseen_ratio",
-    "border_jump",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -183,15 +174,8 @@ def main() -> None:
     if options.runs and len(options.runs) != len(options.styles):
         parser.error("--runs: as many as --styles are needed")
 
-    run = {
-        "date": datetime.now(timezone.utc).date().isoformat(),
-        "device": processor(),
-        "threads": options.threads,
-        "torch": torch.__version__,
-        "vnca": vnca.__version__,
-        "features": options.features,
-    }
-    print(f"{run['device']}, {run['threads']} threads, torch {run['torch']}, vnca {run['vnca']}")
+    facts = {**run_facts("cpu", options.threads), "features": options.features}
+    print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
     print(
         f"{'style':<32}{'method':<11}{'size':>5}{'learn s':>9}{'make s':>8}{'MB':>7}"
         f"{'axis':>8}{'oblique':>9}{'unseen':>8}{'ratio':>7}{'jump':>7}"
@@ -199,7 +183,7 @@ def main() -> None:
     rows: list[dict[str, Any]] = []
 
     def tell(task: Task, method: str, size: int, found: dict[str, Any]) -> None:
-        rows.append({**run, "style": task.style.name, "method": method, "size": size, **found})
+        rows.append({"style": task.style.name, "method": method, "size": size, **found})
         print(
             f"{task.style.name:<32}{method:<11}{size:>5}{found['learn_s']:>9}{found['make_s']:>8}"
             f"{found['peak_mb']:>7}{found['axis']:>8}{found['oblique']:>9}{found['unseen']:>8}"
@@ -223,26 +207,10 @@ def main() -> None:
         for size in options.sizes:
             tell(task, "optimised", size, alone(optimised, task, size))
 
-    for path in filter(None, (options.json, options.csv)):
-        path.parent.mkdir(parents=True, exist_ok=True)
     if options.json is not None:
-        options.json.write_text(json.dumps(rows, indent=2) + "\n")
+        write_json(options.json, facts, rows)
     if options.csv is not None:
-        begun = options.csv.exists()
-        with options.csv.open("a", newline="") as file:
-            table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-            if not begun:
-                table.writeheader()
-            table.writerows(rows)
-
-
-def processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        lines = []
-    models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(models, platform.processor() or platform.machine())
+        append_csv(options.csv, facts, rows)
 
 
 if __name__ == "__main__":

@@ -120,6 +120,12 @@ class Domain:
         return row_of.ravel()[(OFFSETS @ strides)[:, None] + flat]
 
     @cached_property
+    def places(self) -> AnyArray:
+        """`[n]` where each cell lies in its box, if that is laid out flat."""
+        at = self.cells - np.asarray(self.box.lower)
+        return np.asarray(np.ravel_multi_index(tuple(at.T), self.box.shape))
+
+    @cached_property
     def hashes(self) -> HashArray:
         """`[n]` hash of each cell's index coordinates, for the update mask."""
         return hash_cells(self.cells)

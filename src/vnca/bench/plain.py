@@ -68,8 +68,7 @@ class Grid:
         if domain.border != "replicate":
             raise ValueError("the plain step repeats its border")
         self._shape = domain.box.shape
-        at = domain.cells - np.asarray(domain.box.lower)
-        self._places = torch.from_numpy(np.ravel_multi_index(tuple(at.T), self._shape)).to(device)
+        self._places = torch.from_numpy(domain.places).to(device)
 
     def spread(self, values: Tensor) -> Tensor:
         """`[1, K, x, y, z]` of values `[n, K]`, zero where nothing lives; differentiable."""

@@ -4,7 +4,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from vnca.bench.memory import peak_mb
 from vnca.bench.timing import Spread, in_turns
 from vnca.errors import BackendUnavailableError
 from vnca.io.sequence import FrameSequence, find_frames
-from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_smoke
+from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.kernels.update.backend import choose
 from vnca.kernels.update.native import Precision
 from vnca.simulate.scenes import simulate
@@ -69,9 +69,7 @@ class PaintedSequence:
 
     def roll(self, backend: str, threads: int, precision: Precision) -> Roll:
         """The rule in a backend, ready for the sequence."""
-        box = Box((0, 0, 0), (0, 0, 0))
-        for frame in self.sequence:
-            box = box.union(smoke_box(frame.path, self.smoke))
+        box = reduce(Box.union, (volume.box for volume in self.volumes))
         step = stepper(self.rule, backend, threads=threads, precision=precision)
         return Roll(self.rule, step, self.config, box)
 

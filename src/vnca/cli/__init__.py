@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import vnca
 from vnca.cli.progress import end_line
+from vnca.cli.subcommands import usage
 from vnca.cli.termination import terminable
 from vnca.errors import Terminated, VncaError
 
@@ -35,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     if not arguments or arguments[0] in ("-h", "--help", "help"):
-        print(_usage())
+        print(usage("vnca", "Turn smoke simulations into moving paintings.", COMMANDS))
         return 0 if arguments else 2
     name, *rest = arguments
     if name in ("-V", "--version"):
@@ -68,20 +69,3 @@ def _failed(message: str) -> int:
     # What a library says of a damaged file may have several lines.
     print("vnca:", " ".join(message.split()), file=sys.stderr)
     return 2
-
-
-def _usage() -> str:
-    width = max(map(len, COMMANDS))
-    lines = [f"  {name:{width}}  {what}" for name, what in COMMANDS.items()]
-    return "\n".join(
-        [
-            "usage: vnca COMMAND [OPTIONS]",
-            "",
-            "Turn smoke simulations into moving paintings.",
-            "",
-            "commands:",
-            *lines,
-            "",
-            "`vnca COMMAND --help` lists the options of a command.",
-        ]
-    )

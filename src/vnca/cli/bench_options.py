@@ -1,6 +1,7 @@
 """What the options of all benchmarks have in common: `64x64x96`, `plain,native`, and tables."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -57,41 +58,41 @@ def _index(text: str) -> Index:
     return x, y, z
 
 
-def require_writable(*files: Path | None) -> None:
-    """Refuse files that could not be written when all is measured.
+@dataclass(frozen=True)
+class Tables:
+    """Where what is measured is kept."""
 
-    Raises:
-        OutputError: If there is one.
-    """
-    for path in files:
-        if path is not None:
+    json: Path | None = None
+    """Write the rows of this run here."""
+    csv: Path | None = None
+    """Add the rows to this table."""
+
+    def require_writable(self) -> None:
+        """Refuse files that could not be written when all is measured.
+
+        Raises:
+            OutputError: If there is one.
+        """
+        for path in filter(None, (self.json, self.csv)):
             writable_file(path)
 
+    def keep(
+        self, facts: Mapping[str, Any], rows: Rows, peaks: Mapping[str, Any] | None = None
+    ) -> None:
+        """Write the rows where they are asked for.
 
-def keep(
-    facts: Mapping[str, Any],
-    rows: Rows,
-    *,
-    json: Path | None,
-    csv: Path | None,
-    peaks: Mapping[str, Any] | None = None,
-) -> None:
-    """Write the rows where they are asked for.
+        Args:
+            facts: What all rows share.
+            rows: What was measured.
+            peaks: Of the machine, for the object in JSON.
 
-    Args:
-        facts: What all rows share.
-        rows: What was measured.
-        json: File for one object with everything.
-        csv: Table that the rows are added to.
-        peaks: Of the machine, for the object.
-
-    Raises:
-        VncaError: If a file cannot be written.
-    """
-    if json is not None:
-        write_json(json, {**facts, **(peaks or {})}, rows)
-    if csv is not None:
-        append_csv(csv, facts, rows)
+        Raises:
+            VncaError: If a file cannot be written.
+        """
+        if self.json is not None:
+            write_json(self.json, {**facts, **(peaks or {})}, rows)
+        if self.csv is not None:
+            append_csv(self.csv, facts, rows)
 
 
 def short(value: float | None) -> str:

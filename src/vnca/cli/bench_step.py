@@ -2,17 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from vnca.bench.step import TOLERANCES, StepConfig, StepRun, measure_steps, prepare
-from vnca.cli.bench_options import keep, parse_bench, require_writable, short
+from vnca.cli.bench_options import Tables, parse_bench, short
 
 
 @dataclass(frozen=True)
-class Step:
+class Step(Tables):
     """Time one step of the automaton in every backend, in turns, in one run.
 
     Times are per living cell. GFLOP/s count the matrix products that are needed, the same for
@@ -21,10 +20,6 @@ class Step:
 
     config: Annotated[StepConfig, tyro.conf.arg(name="")] = field(default_factory=StepConfig)
     """What is measured."""
-    json: Path | None = None
-    """Write the rows of this run here."""
-    csv: Path | None = None
-    """Add the rows to this table."""
 
 
 def run(arguments: Sequence[str]) -> None:
@@ -38,7 +33,7 @@ def bench_step(options: Step) -> None:
     Raises:
         VncaError: If something cannot be measured or written, or backends disagree.
     """
-    require_writable(options.json, options.csv)
+    options.require_writable()
     facts = prepare(options.config)
     print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
     rows = []
@@ -46,7 +41,7 @@ def bench_step(options: Step) -> None:
         print("\n".join(_table(run)))
         rows += run.rows
     peaks = {name: rows[0][name] for name in ("gemm_gflops", "copy_gbs")}
-    keep(facts, rows, json=options.json, csv=options.csv, peaks=peaks)
+    options.keep(facts, rows, peaks)
 
 
 def _table(run: StepRun) -> list[str]:

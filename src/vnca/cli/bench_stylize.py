@@ -18,7 +18,7 @@ from vnca.bench.stylize import (
     random_rule,
     simulated,
 )
-from vnca.cli.bench_options import Rows, keep, parse_bench, require_writable, short
+from vnca.cli.bench_options import Rows, Tables, parse_bench, short
 from vnca.cli.options import say
 from vnca.cli.sequence import open_sequence
 from vnca.errors import OptionError
@@ -28,7 +28,7 @@ from vnca.kernels.update.native import Precision, default_threads
 
 
 @dataclass(frozen=True)
-class BenchStylize:
+class BenchStylize(Tables):
     """Time frames of painting a sequence, computing only and with files, in every backend.
 
     Paints a simulated plume with a random rule unless both are given. A random rule costs what a
@@ -57,10 +57,6 @@ class BenchStylize:
     """Of the native kernel; as many as there are cores unless given."""
     repeats: int = 3
     """How often the sequence is painted by each backend, in turns."""
-    json: Path | None = None
-    """Write the rows of this run here."""
-    csv: Path | None = None
-    """Add the rows to this table."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
 
@@ -89,7 +85,7 @@ def bench_stylize(options: BenchStylize) -> None:
     Raises:
         VncaError: If something cannot be measured or written, or backends disagree.
     """
-    require_writable(options.json, options.csv)
+    options.require_writable()
     backends = options.backends or available()
     for name in backends:  # what cannot run is refused before smoke is simulated
         array_step(name, precision=options.precision if name == "native" else "float32")
@@ -104,7 +100,7 @@ def bench_stylize(options: BenchStylize) -> None:
         )
     print("{device}, {threads} threads, vnca {vnca}".format(**facts))
     print("\n".join(_table(rows)))
-    keep(facts, rows, json=options.json, csv=options.csv)
+    options.keep(facts, rows)
 
 
 def _painted(options: BenchStylize, folder: Path) -> PaintedSequence:

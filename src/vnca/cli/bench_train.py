@@ -12,11 +12,11 @@ import tyro
 from vnca.bench.contenders import available, require
 from vnca.bench.machine import run_facts
 from vnca.bench.train import Training, measure_training
-from vnca.cli.bench_options import Rows, keep, parse_bench, require_writable, short
+from vnca.cli.bench_options import Rows, Tables, parse_bench, short
 from vnca.cli.demo import STYLE
 from vnca.cli.options import say
 from vnca.cli.sequence import beside
-from vnca.cli.train import choose_device
+from vnca.cli.session import choose_device
 from vnca.errors import OptionError
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image
@@ -33,7 +33,7 @@ _FRAME = 30
 
 
 @dataclass(frozen=True)
-class BenchTrain:
+class BenchTrain(Tables):
     """Time iterations of real training in every backend, in turns, in one run.
 
     Trains on a simulated plume and a painting of the package unless others are given. Every
@@ -64,10 +64,6 @@ class BenchTrain:
     """Of the CPU; as many as it has cores unless given."""
     repeats: int = 5
     """Iterations that are timed."""
-    json: Path | None = None
-    """Write the rows of this run here."""
-    csv: Path | None = None
-    """Add the rows to this table."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
 
@@ -103,7 +99,7 @@ def bench_train(options: BenchTrain) -> None:
     Raises:
         VncaError: If something cannot be measured or written, or backends disagree.
     """
-    require_writable(options.json, options.csv)
+    options.require_writable()
     device, config = choose_device(options.device), options.config
     for name in options.backends:
         require(name, "float32", device.type)
@@ -120,7 +116,7 @@ def bench_train(options: BenchTrain) -> None:
     rows = [{**row, "preset": options.preset} for row in rows]
     print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
     print("\n".join(_table(rows)))
-    keep(facts, rows, json=options.json, csv=options.csv)
+    options.keep(facts, rows)
 
 
 def _smoke(options: BenchTrain) -> Volume:

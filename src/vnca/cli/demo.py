@@ -64,7 +64,7 @@ def demonstrate(options: Demo) -> None:
             Train(
                 trained,
                 style,
-                run_folder,
+                out=run_folder,
                 overwrite=True,
                 config=_config(options),
             )

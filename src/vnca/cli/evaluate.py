@@ -109,11 +109,12 @@ def evaluate(options: Evaluate) -> None:
     if options.json:
         writable_file(options.json)
     smoke = _read(options.frame, options.smoke)
-    measures = measure_motion(rule, smoke, estimators(), size=options.size)
+    seen_by = estimators()
+    measures = measure_motion(rule, smoke, seen_by, size=options.size)
     print(f"the smoke moves by {measures.speed:.2f} pixels a frame where motion is measured")
     print(_heading())
     print(_row(str(options.run), [measures]))
-    _print_yardsticks(rule, smoke, options.size)
+    _print_yardsticks(rule, smoke, seen_by, options.size)
     if options.json:
         _write(options.json, as_json(measures))
 
@@ -146,7 +147,7 @@ def ablate(options: Ablation) -> None:
                 Train(
                     options.frame,
                     options.style,
-                    folder,
+                    out=folder,
                     preset=options.preset,
                     overwrite=True,
                     device=options.device,
@@ -160,7 +161,7 @@ def ablate(options: Ablation) -> None:
     print(_heading())
     for variant, runs in found.items():
         print(_row(variant, runs))
-    _print_yardsticks(rules[-1], smoke, options.size)
+    _print_yardsticks(rules[-1], smoke, seen_by, options.size)
     if options.json:
         _write(options.json, {name: [*map(as_json, runs)] for name, runs in found.items()})
 
@@ -203,11 +204,13 @@ def as_json(measures: MotionMeasures) -> dict[str, Any]:
     }
 
 
-def _print_yardsticks(rule: Rule, smoke: Volume, size: int) -> None:
+def _print_yardsticks(
+    rule: Rule, smoke: Volume, seen_by: Mapping[str, Estimator], size: int
+) -> None:
     """What the measures say of a texture that follows the smoke, and of one that only drifts."""
     drift = "".join(f"{value:>12.3f}" for value in measure_drift(rule, smoke, size=size))
     print(f"{'drifting as one':22}{drift}{drift}{'-':>12}")
-    print(_row("carried noise", [measure_carried_noise(rule, smoke, estimators(), size=size)]))
+    print(_row("carried noise", [measure_carried_noise(rule, smoke, seen_by, size=size)]))
 
 
 def _heading() -> str:

@@ -26,7 +26,7 @@ from vnca.io.image import resize, to_srgb8
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.course import CourseConfig
 from vnca.training.loop import Trainer
-from vnca.training.memory import is_out_of_memory, memory_advice
+from vnca.training.memory import is_out_of_memory, memory_advice, memory_budget
 from vnca.training.preview import preview_sheet
 from vnca.training.run import RunFolder
 from vnca.typing import FloatArray
@@ -34,7 +34,43 @@ from vnca.typing import FloatArray
 THUMBNAIL = 96
 """Rows and columns of the style picture kept in a model file."""
 
-T = TypeVar("T")
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingOptions:
+    """What is asked of a training, whatever it is trained on."""
+
+    out: Path
+    """Folder of the run: model, configuration, previews and loss curves."""
+    overwrite: bool = False
+    """Replace the model of an earlier run in the same folder."""
+    preview_every: int = 50
+    """Iterations between preview pictures, at which the model is saved too."""
+    device: str = "auto"
+    """Where to compute: auto, cpu or cuda."""
+    memory_budget: str = "auto"
+    """Memory for the program, such as 12GB (on a GPU: of the GPU): what does not fit of a rollout
+    is computed again, with the same result. auto takes what is free."""
+
+    def __post_init__(self) -> None:
+        if self.preview_every < 1:
+            raise OptionError(f"--preview-every {self.preview_every}: at least 1 is needed")
+        memory_budget(self.memory_budget)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResumeOptions:
+    """What may be asked when a training goes on; all else holds as it was asked for first.
+
+    Fields of its subclasses are named as those that they take the place of.
+    """
+
+    resume: Path
+    """Folder of the run. All that was asked for when it began holds."""
+    memory_budget: str | None = None
+    """Memory for the program from now on, such as 12GB or auto."""
+
+
+T = TypeVar("T", bound=TrainingOptions)
 
 
 @dataclass(frozen=True)
@@ -155,17 +191,19 @@ class Session:
         )
 
 
-def interrupted(command: str, kind: type[T], folder: Path) -> tuple[T, Checkpoint] | None:
-    """What was asked of an interrupted training, and where it was left; None if it has ended.
+def interrupted(command: str, kind: type[T], options: ResumeOptions) -> tuple[T, Checkpoint] | None:
+    """What is asked of an interrupted training, and where it was left; None if it has ended.
 
     Args:
         command: The command that goes on, without `vnca`.
         kind: The options it begins with.
-        folder: The folder of the run.
+        options: What is asked now; it takes the place of what was asked first.
 
     Raises:
         FileFormatError: If there is no training to go on with, or it is another command's.
+        OptionError: If what is asked now cannot be.
     """
+    folder = options.resume
     path = folder / CHECKPOINT_NAME
     if not path.exists():
         if not (folder / MODEL_NAME).exists():
@@ -182,12 +220,16 @@ def interrupted(command: str, kind: type[T], folder: Path) -> tuple[T, Checkpoin
             f"vnca {checkpoint.command} --resume {folder}"
         )
     try:
-        return restored(kind, checkpoint.options), checkpoint
+        begun = restored(kind, checkpoint.options)
     except (KeyError, TypeError, ValueError, VncaError) as error:
         raise FileFormatError(
             f"{path}: vnca {checkpoint.version} wrote this checkpoint with other options than "
             f"this one has, or it is damaged ({error})"
         ) from error
+    fields = (field.name for field in dataclasses.fields(options) if field.name != "resume")
+    given = {name: getattr(options, name) for name in fields}
+    changed = {name: value for name, value in given.items() if value is not None}
+    return dataclasses.replace(begun, out=folder, **changed), checkpoint
 
 
 def run_folder(path: Path, *, overwrite: bool, checkpoint: Checkpoint | None) -> RunFolder:

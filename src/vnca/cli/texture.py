@@ -1,9 +1,8 @@
 """`vnca texture {train,bake,volume,turntable}`: solid textures for meshes."""
 
-import importlib
 from collections.abc import Sequence
 
-from vnca.errors import OptionError
+from vnca.cli.subcommands import run_subcommand
 
 COMMANDS = {
     "train": "learn a solid texture from one picture",
@@ -14,31 +13,5 @@ COMMANDS = {
 
 
 def run(arguments: Sequence[str]) -> None:
-    """Run one of the subcommands, each a module of this package named after it.
-
-    Raises:
-        OptionError: If there is none of that name.
-    """
-    name, rest = (arguments[0], arguments[1:]) if arguments else ("", ())
-    if name in ("-h", "--help"):
-        print(_usage())
-        return
-    if name not in COMMANDS:
-        raise OptionError(f"vnca texture: expected one of {', '.join(COMMANDS)}, got '{name}'")
-    importlib.import_module(f"vnca.cli.texture_{name}").run(rest)
-
-
-def _usage() -> str:
-    lines = [f"  {name:10} {what}" for name, what in COMMANDS.items()]
-    return "\n".join(
-        [
-            "usage: vnca texture COMMAND [OPTIONS]",
-            "",
-            "Grow solid textures and put them on meshes.",
-            "",
-            "commands:",
-            *lines,
-            "",
-            "`vnca texture COMMAND --help` lists the options of a command.",
-        ]
-    )
+    """Run one of the subcommands."""
+    run_subcommand("texture", "Grow solid textures and put them on meshes.", COMMANDS, arguments)

@@ -1,6 +1,5 @@
 """`vnca texture train STYLE --out RUN`, and `vnca texture train --resume RUN`."""
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +10,9 @@ import tyro
 
 from vnca.cli.options import chosen, is_given, parse
 from vnca.cli.session import (
+    ResumeOptions,
     Session,
+    TrainingOptions,
     asked,
     choose_device,
     fitting,
@@ -20,7 +21,6 @@ from vnca.cli.session import (
     run_folder,
 )
 from vnca.cli.texture_block import KIND
-from vnca.errors import OptionError
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image
 from vnca.io.mesh import Mesh, read_mesh
@@ -35,7 +35,7 @@ COMMAND = "texture train"
 
 
 @dataclass(frozen=True)
-class TrainTexture:
+class TrainTexture(TrainingOptions):
     """Learn a solid texture from one picture.
 
     `vnca texture train --resume RUN` goes on with a training that was interrupted.
@@ -43,40 +43,20 @@ class TrainTexture:
 
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
     """The picture: PNG, JPEG or WebP."""
-    out: Path
-    """Folder of the run: model, configuration, previews and loss curves."""
     mesh: Path | None = None
     """Look at this mesh too while training: GLB, OBJ, PLY or STL."""
     up_axis: UpAxis | None = None
     """The mesh's up axis; y for OBJ and GLB, z for PLY and STL unless given."""
     preset: Literal["draft", "standard"] = "draft"
     """Values of all options below that are not given."""
-    overwrite: bool = False
-    """Replace the model of an earlier run in the same folder."""
-    preview_every: int = 50
-    """Iterations between preview pictures, at which the model is saved too."""
-    device: str = "auto"
-    """Where to compute: auto, cpu or cuda."""
-    memory_budget: str = "auto"
-    """Memory for the program, such as 12GB (on a GPU: of the GPU): what does not fit of a rollout
-    is computed again, with the same result. auto takes what is free."""
     config: Annotated[TextureConfig, tyro.conf.arg(name="")] = field(default_factory=TextureConfig)
     """Hyperparameters."""
 
-    def __post_init__(self) -> None:
-        if self.preview_every < 1:
-            raise OptionError(f"--preview-every {self.preview_every}: at least 1 is needed")
-        memory_budget(self.memory_budget)
-
 
 @dataclass(frozen=True)
-class ResumeTexture:
+class ResumeTexture(ResumeOptions):
     """Go on with a training that was interrupted, as if it had not been."""
 
-    resume: Path
-    """Folder of the run. All that was asked for when it began holds."""
-    memory_budget: str | None = None
-    """Memory for the program from now on, such as 12GB or auto."""
     style: Path | None = None
     """The picture, if it is no longer where it was."""
     mesh: Path | None = None
@@ -90,7 +70,7 @@ def run(arguments: Sequence[str]) -> None:
         return
     preset = chosen(arguments, "--preset", "draft")
     missing: Any = tyro.MISSING
-    defaults = TrainTexture(missing, missing, config=PRESETS.get(preset, TextureConfig()))
+    defaults = TrainTexture(missing, out=missing, config=PRESETS.get(preset, TextureConfig()))
     train(parse(COMMAND, TrainTexture, arguments, default=defaults))
 
 
@@ -143,17 +123,9 @@ def resume(options: ResumeTexture) -> Path:
     Raises:
         VncaError: If there is no checkpoint, an input changed, or as `train` says.
     """
-    left = interrupted(COMMAND, TrainTexture, options.resume)
+    left = interrupted(COMMAND, TrainTexture, options)
     if left is not None:
-        begun, checkpoint = left
-        again = dataclasses.replace(
-            begun,
-            out=options.resume,
-            memory_budget=options.memory_budget or begun.memory_budget,
-            style=options.style or begun.style,
-            mesh=options.mesh or begun.mesh,
-        )
-        train(again, checkpoint)
+        train(*left)
     return options.resume
 
 

@@ -12,7 +12,9 @@ import tyro
 from vnca.cli.options import chosen, is_given, parse
 from vnca.cli.sequence import beside
 from vnca.cli.session import (
+    ResumeOptions,
     Session,
+    TrainingOptions,
     asked,
     choose_device,
     fitting,
@@ -20,7 +22,7 @@ from vnca.cli.session import (
     judged_by,
     run_folder,
 )
-from vnca.errors import GridError, OptionError
+from vnca.errors import GridError
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image
 from vnca.io.smoke import SmokeFormat, read_smoke
@@ -33,7 +35,7 @@ COMMAND = "train"
 
 
 @dataclass(frozen=True)
-class Train:
+class Train(TrainingOptions):
     """Learn a rule from one frame of smoke and one picture.
 
     `vnca train --resume RUN` goes on with a training that was interrupted.
@@ -43,38 +45,18 @@ class Train:
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
     """The picture: PNG, JPEG or WebP."""
-    out: Path
-    """Folder of the run: model, configuration, previews and loss curves."""
     preset: Literal["draft", "standard", "paper"] = "draft"
     """Values of all options below that are not given."""
-    overwrite: bool = False
-    """Replace the model of an earlier run in the same folder."""
-    preview_every: int = 50
-    """Iterations between preview pictures, at which the model is saved too."""
-    device: str = "auto"
-    """Where to compute: auto, cpu or cuda."""
-    memory_budget: str = "auto"
-    """Memory for the program, such as 12GB (on a GPU: of the GPU): what does not fit of a rollout
-    is computed again, with the same result. auto takes what is free."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=TrainConfig)
     """Hyperparameters."""
 
-    def __post_init__(self) -> None:
-        if self.preview_every < 1:
-            raise OptionError(f"--preview-every {self.preview_every}: at least 1 is needed")
-        memory_budget(self.memory_budget)
-
 
 @dataclass(frozen=True)
-class Resume:
+class Resume(ResumeOptions):
     """Go on with a training that was interrupted, as if it had not been."""
 
-    resume: Path
-    """Folder of the run. All that was asked for when it began holds."""
-    memory_budget: str | None = None
-    """Memory for the program from now on, such as 12GB or auto."""
     frame: Path | None = None
     """The frame, if it is no longer where it was."""
     style: Path | None = None
@@ -84,14 +66,14 @@ class Resume:
 def run(arguments: Sequence[str]) -> None:
     """Read the options and train, or go on with a training."""
     if is_given(arguments, "--resume"):
-        resume(parse("train", Resume, arguments))
+        resume(parse(COMMAND, Resume, arguments))
         return
     preset = chosen(arguments, "--preset", "draft")
     missing: Any = tyro.MISSING
     defaults = Train(
         frame=missing, style=missing, out=missing, config=PRESETS.get(preset, TrainConfig())
     )
-    train(parse("train", Train, arguments, default=defaults))
+    train(parse(COMMAND, Train, arguments, default=defaults))
 
 
 def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
@@ -153,15 +135,7 @@ def resume(options: Resume) -> Path:
     Raises:
         VncaError: If there is no checkpoint, an input changed, or as `train` says.
     """
-    left = interrupted(COMMAND, Train, options.resume)
+    left = interrupted(COMMAND, Train, options)
     if left is not None:
-        begun, checkpoint = left
-        again = dataclasses.replace(
-            begun,
-            out=options.resume,
-            memory_budget=options.memory_budget or begun.memory_budget,
-            frame=options.frame or begun.frame,
-            style=options.style or begun.style,
-        )
-        train(again, checkpoint)
+        train(*left)
     return options.resume

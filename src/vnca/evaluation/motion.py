@@ -137,10 +137,9 @@ def measure_carried_noise(
         noise[..., channel] = gaussian_filter(random.standard_normal(noise.shape[:3]), grain)
     noise *= 0.25 / noise[..., COLOUR].std()
     cells = torch.from_numpy(scene.domain.cells - np.asarray(scene.domain.box.lower)).float()
-    velocity = torch.from_numpy(_velocity(scene, smoke))
     states = []
     for frame in range(frames + 1):
-        carried = sample(torch.from_numpy(noise), cells - frame * velocity)
+        carried = sample(torch.from_numpy(noise), cells - frame * scene.velocity)
         states.append(np.concatenate([carried.numpy(), np.zeros((1, channels), np.float32)]))
     return _measure(scene, smoke, states, estimators)
 
@@ -159,19 +158,15 @@ def measure_drift(rule: Rule, smoke: Volume, *, size: int = 128) -> tuple[float,
         GridError: As `measure_motion` does.
     """
     scene = _moving_scene(rule, smoke, size)
-    state = scene.domain.seed(rule.config.channels)
-    velocity = _velocity(scene, smoke)
-    mean = velocity[velocity.any(axis=1)].mean(axis=0)
-    assert smoke.velocity is not None
-    drifting = dataclasses.replace(smoke, velocity=np.broadcast_to(mean, smoke.velocity.shape))
-    drifting_scene = SmokeScene(drifting, rule, scene.view)
-    pairs = [_look(scene, state, state, azimuth) for azimuth in AZIMUTHS]
-    drifts = [_look(drifting_scene, state, state, azimuth).target for azimuth in AZIMUTHS]
-    motion = compare_motion(
-        torch.from_numpy(np.stack(drifts)),
-        torch.from_numpy(np.stack([pair.target for pair in pairs])),
-        torch.from_numpy(np.stack([pair.where for pair in pairs])),
+    state = scene.seed(rule.config.channels)
+    mean = scene.velocity[scene.velocity.any(dim=1)].mean(dim=0).numpy()
+    everywhere = np.broadcast_to(mean, (*smoke.density.shape, 3))
+    drifting = SmokeScene(dataclasses.replace(smoke, velocity=everywhere), rule, scene.view)
+    drifts = torch.stack([_target(drifting, state, azimuth)[0] for azimuth in AZIMUTHS])
+    targets, where = map(
+        torch.stack, zip(*(_target(scene, state, azimuth) for azimuth in AZIMUTHS), strict=True)
     )
+    motion = compare_motion(drifts, targets, where)
     return float(motion.direction), float(motion.magnitude)
 
 
@@ -182,12 +177,6 @@ def _moving_scene(rule: Rule, smoke: Volume, size: int) -> SmokeScene:
     return scene
 
 
-def _velocity(scene: SmokeScene, smoke: Volume) -> FloatArray:
-    """`[n, 3]`, cells per frame."""
-    assert smoke.velocity is not None
-    return scene.domain.gather(smoke.velocity, smoke.origin).astype(np.float32)
-
-
 def _measure(
     scene: SmokeScene,
     smoke: Volume,
@@ -195,7 +184,8 @@ def _measure(
     estimators: Mapping[str, Estimator],
 ) -> MotionMeasures:
     """How states a frame apart move."""
-    velocity = _velocity(scene, smoke)
+    velocity = _dense(scene, scene.velocity.numpy())
+    inside = _inside(scene)
     pairs = [
         _look(scene, before, after, azimuth)
         for before, after in pairwise(states)
@@ -209,9 +199,7 @@ def _measure(
         direction={name: direction for name, (direction, _) in compared.items()},
         magnitude={name: magnitude for name, (_, magnitude) in compared.items()},
         transport=_mean(
-            transport_ratio(
-                _dense(scene, before), _dense(scene, after), _dense(scene, velocity), _inside(scene)
-            )
+            transport_ratio(_dense(scene, before), _dense(scene, after), velocity, inside)
             for before, after in pairwise(states)
         ),
         speed=float(
@@ -259,7 +247,7 @@ def _states(
 def _look(scene: SmokeScene, before: FloatArray, after: FloatArray, azimuth: float) -> SeenPair:
     camera = scene.camera(azimuth, ELEVATION)
     earlier, later = (torch.from_numpy(state) for state in (before, after))
-    target, opacity = scene.motion(earlier, SmokeSight(camera, offset=0.0), scene.view.size)
+    target, where = _target(scene, earlier, azimuth)
     shown = [scene.look(state, camera) for state in (earlier, later)]
     # The mean colour of the smoke behind it: a silhouette that stands still should not be seen.
     weight = shown[0].opacity.sum().clamp_min(1e-6)
@@ -268,8 +256,15 @@ def _look(scene: SmokeScene, before: FloatArray, after: FloatArray, azimuth: flo
         before=_grey(shown[0].over(background)),
         after=_grey(shown[1].over(background)),
         target=target.numpy(),
-        where=supervised(target, opacity, MotionConfig()).numpy(),
+        where=where.numpy(),
     )
+
+
+def _target(scene: SmokeScene, state: Tensor, azimuth: float) -> tuple[Tensor, Tensor]:
+    """How the smoke is seen to move, `[r, c, 2]`, and where motion is compared, `[r, c]`."""
+    sight = SmokeSight(scene.camera(azimuth, ELEVATION), offset=0.0)
+    target, opacity = scene.motion(state, sight, scene.view.size)
+    return target, supervised(target, opacity, MotionConfig())
 
 
 def _grey(picture: Tensor) -> FloatArray:

@@ -34,9 +34,7 @@ class Scene(ABC, Generic[Sight]):
         self.domain = domain
         self.neighbours = torch.from_numpy(domain.neighbours).to(device)
         self.priors = torch.from_numpy(priors).to(device)
-        at = domain.cells - np.asarray(domain.box.lower)
-        flat = np.ravel_multi_index(tuple(at.T), domain.box.shape)
-        self._flat = torch.from_numpy(flat).to(device)
+        self._places = torch.from_numpy(domain.places).to(device)
 
     def seed(self, channels: int) -> Tensor:
         """The state every rollout starts from, zeros `[n + 1, channels]`."""
@@ -46,7 +44,7 @@ class Scene(ABC, Generic[Sight]):
         """Values of the cells `[n, ...]` over their box `[x, y, z, ...]`; differentiable."""
         shape = self.domain.box.shape
         field = values.new_zeros(int(np.prod(shape)), *values.shape[1:])
-        return field.index_copy(0, self._flat, values).view(*shape, *values.shape[1:])
+        return field.index_copy(0, self._places, values).view(*shape, *values.shape[1:])
 
     @abstractmethod
     def sight(self, random: np.random.Generator) -> Sight:

@@ -46,7 +46,8 @@ class SmokeScene(Scene[SmokeSight]):
     Attributes:
         view: How it is looked at.
         box: The cells that hold smoke lie in it.
-        moves: Whether the smoke has any velocity.
+        velocity: `[n, 3]`, cells per frame.
+        moves: Whether the smoke has any.
     """
 
     def __init__(
@@ -90,7 +91,7 @@ class SmokeScene(Scene[SmokeSight]):
         if smoke.velocity is not None:
             velocity[:] = domain.gather(smoke.velocity, smoke.origin)
         self.moves = bool(velocity.any())
-        self._velocity = torch.from_numpy(velocity).to(device)
+        self.velocity = torch.from_numpy(velocity).to(device)
 
     def camera(
         self, azimuth: float, elevation: float, *, aspect: float = 1.0
@@ -157,7 +158,7 @@ class SmokeScene(Scene[SmokeSight]):
         """
         return projected_velocity(
             self._painted_density(state),
-            self.dense(self._velocity),
+            self.dense(self.velocity),
             sight.camera,
             rows=size,
             columns=size,
