@@ -59,6 +59,15 @@ def test_a_turning_mesh_stays_in_the_picture(tmp_path: Path) -> None:
         assert picture.min() < 0.1
 
 
+def test_a_turning_mesh_keeps_its_size(ball: Path) -> None:
+    table = Turntable(read_mesh(ball), replace(FILM, frames=16))
+    covered = [
+        np.mean(table.picture(frame, lambda triangles, _: np.zeros((len(triangles), 3))) < 0.5)
+        for frame in range(16)
+    ]
+    np.testing.assert_allclose(covered, covered[0], rtol=0.01)
+
+
 @pytest.mark.parametrize("inverted", [False, True])
 def test_the_lit_side_is_brighter_also_inside_out(tmp_path: Path, inverted: bool) -> None:
     ball = trimesh.creation.icosphere(3)

@@ -6,7 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from vnca.camera import frame_box, view_axes
+from vnca.camera import Orthographic, view_axes
 from vnca.errors import OptionError
 from vnca.io.mesh import Mesh
 from vnca.io.mesh_texture import BaseColour, base_colours
@@ -19,6 +19,9 @@ SAMPLES = 2
 """Samples along either side of a pixel."""
 AMBIENT = 0.45
 """Share of the light that comes from everywhere; the rest comes from over the right shoulder."""
+
+MARGIN = 0.04
+"""Part of the picture's height and width left free on every side."""
 
 Shader = Callable[[AnyArray, AnyArray], AnyArray]
 """Linear RGB `[n, 3]` of points, from their triangles `[n]` and corner weights `[n, 3]`."""
@@ -75,11 +78,14 @@ class Turntable:
         )
         self._config = config
         low, high = mesh.bounds
-        middle = (low + high) / 2
-        # A turning mesh fills a cylinder, so the picture is framed on one.
-        radius = float(np.linalg.norm(self.points[:, :2] - middle[:2], axis=1).max())
-        half = np.array([radius, radius, max((high - low)[2] / 2, 1e-6 * radius)])
-        self._low, self._high = (middle - half).tolist(), (middle + half).tolist()
+        self._middle = (low + high) / 2
+        # The picture holds every point wherever the turn takes it, so that the mesh keeps its size.
+        offset = self.points - self._middle
+        radius = np.linalg.norm(offset[:, :2], axis=1)
+        tilt = np.radians(abs(config.elevation))
+        tall = (np.abs(offset[:, 2]) * np.cos(tilt) + radius * np.sin(tilt)).max()
+        wide = radius.max() * config.rows / config.columns
+        self._height = float(2 * max(tall, wide) / (1 - 2 * MARGIN))
         self._normals = _vertex_normals(self.points, self.faces)
 
     def at(self, points: AnyArray) -> Callable[[AnyArray, AnyArray], AnyArray]:
@@ -95,7 +101,8 @@ class Turntable:
         config = self._config
         rows, columns = SAMPLES * config.rows, SAMPLES * config.columns
         azimuth = config.azimuth + config.turn * frame / config.frames
-        camera = frame_box(self._low, self._high, azimuth, config.elevation, aspect=columns / rows)
+        x, y, z = self._middle.tolist()
+        camera = Orthographic((x, y, z), azimuth, config.elevation, height=self._height)
         seen = visible(self.points, self.faces, camera, rows=rows, columns=columns)
         covered, weights = seen.covered, seen.weights[seen.covered]
         triangles = seen.triangle[covered]
