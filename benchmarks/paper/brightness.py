@@ -40,13 +40,18 @@ def vary(study: Brightness) -> None:
         for mode in get_args(Mode):
             for gamma in study.gammas:
                 measures = seen(judge, painting, rule, gamma, mode)
-                findings.add(f"{mode}, γ × {Fraction(gamma)}", measures, seed=seed)
+                findings.add(f"{mode}, {times(gamma)}", measures, seed=seed)
             if seed == study.seeds[0]:
-                pictures[mode] = [
-                    judge.portrait(painting, rule, gamma=gamma, mode=mode) for gamma in study.gammas
-                ]
+                pictures[mode] = {
+                    times(gamma): judge.portrait(painting, rule, gamma=gamma, mode=mode)
+                    for gamma in study.gammas
+                }
     findings.tell()
     study.picture("brightness", judge.sheet(pictures))
+
+
+def times(gamma: float) -> str:
+    return f"gamma x {Fraction(gamma).limit_denominator(1000)}"
 
 
 def seen(

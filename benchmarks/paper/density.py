@@ -7,31 +7,52 @@ the others see the density. Judged by views from all around, none of them drawn 
 Reference: VNCA section 4.3, "Density encoding".
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from judge import SIDES, UNPAINTED, Judge, paint
+from judge import UNPAINTED, Judge, paint
 from study import REFERENCE, Findings, Study, run
 
+from vnca.automaton.domain import DomainKind
+from vnca.training.config import TrainConfig
 
-def compare(study: Study) -> None:
+DOMAINS = {"active": "smoke", "box": "its box"}
+
+
+@dataclass(frozen=True)
+class Density(Study):
+    """On what the study is made."""
+
+    domain: DomainKind | None = None
+    """Where cells live: within reach of the smoke (active), whose surface tells them where it is,
+    or in all of its box as in the paper; as the preset has it unless given."""
+
+    @property
+    def config(self) -> TrainConfig:
+        """That of the reference."""
+        config = super().config
+        return replace(config, rule=replace(config.rule, domain=self.domain or config.rule.domain))
+
+
+def compare(study: Density) -> None:
     smoke, config, judge = study.volume, study.config, Judge(study)
     rule_config = replace(config.rule, density_prior=False)
     kinds = {"with": config, "without": replace(config, rule=rule_config)}
+    where = f"cells in {DOMAINS[config.rule.domain]}"
     findings, pictures = Findings(study, "density"), {}
     reference = study.trained(REFERENCE, config, study.seeds[0])
     white = paint(reference, smoke, UNPAINTED)
-    findings.add("white smoke", judge.around(white, reference))
+    findings.add("white smoke", judge.around(white, reference), on=where)
     for kind, kind_config in kinds.items():
         for seed, rule in study.rules(f"{kind}_density", kind_config):
             painting = paint(rule, smoke)
-            findings.add(f"{kind} density encoding", judge.around(painting, rule), seed=seed)
+            findings.add(
+                f"{kind} density encoding", judge.around(painting, rule), seed=seed, on=where
+            )
             if seed == study.seeds[0]:
-                pictures[f"{kind} density encoding"] = [
-                    judge.portrait(painting, rule, sight) for sight in SIDES.values()
-                ]
+                pictures[f"{kind} density"] = judge.sides(painting, rule)
     findings.tell()
-    study.picture("density", judge.sheet(pictures))
+    study.picture(f"density_{config.rule.domain}", judge.sheet(pictures))
 
 
 if __name__ == "__main__":
-    run(Study, compare, __doc__)
+    run(Density, compare, __doc__)

@@ -53,24 +53,25 @@ def generalise(study: Generalisation) -> None:
     judge, findings = Judge(study), Findings(study, "generalisation")
     pictures = {}
     for seed, rule in study.rules(REFERENCE, study.config):
-        everything = []
-        portraits = []
+        measures, portraits = {}, {}
         for painting in painted(study, rule):
-            everything.append(judged(judge, painting, rule))
-            findings.add("sequence", everything[-1], seed=seed, on=f"frame {painting.smoke.frame}")
-            portraits.append(judge.portrait(painting, rule))
-        findings.add("sequence", means(everything), seed=seed, on="all frames")
+            name = f"frame {painting.smoke.frame}"
+            measures[name] = judged(judge, painting, rule)
+            portraits[name] = judge.portrait(painting, rule)
+            findings.add("sequence", measures[name], seed=seed, on=name)
+        findings.add("sequence", means([*measures.values()]), seed=seed, on="all frames")
         others = {"jets": last(simulate("jets", resolution=RESOLUTION, frames=LATE, seed=0))}
-        others |= {f"grid × {factor:g}": magnified(study.volume, factor) for factor in FACTORS}
+        others |= {f"grid x {factor:g}": magnified(study.volume, factor) for factor in FACTORS}
         paintings = {name: paint(rule, smoke) for name, smoke in others.items()}
         for name, painting in paintings.items():
             findings.add("unseen", judged(judge, painting, rule), seed=seed, on=name)
         if seed == study.seeds[0]:
-            chosen = np.linspace(0, len(portraits) - 1, SHOWN).round().astype(int)
-            pictures["sequence"] = [portraits[frame] for frame in chosen]
-            pictures[", ".join(paintings)] = [
-                judge.portrait(painting, rule) for painting in paintings.values()
-            ]
+            names = [*portraits]
+            chosen = np.linspace(0, len(names) - 1, SHOWN).round().astype(int)
+            pictures["sequence"] = {names[at]: portraits[names[at]] for at in chosen}
+            pictures["unseen"] = {
+                name: judge.portrait(painting, rule) for name, painting in paintings.items()
+            }
     findings.tell()
     study.picture("generalisation", judge.sheet(pictures))
 

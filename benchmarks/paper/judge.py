@@ -1,6 +1,6 @@
 """How painted smoke looks, from where no rule was trained to be looked at, and how well."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import torch
@@ -138,12 +138,16 @@ class Judge:
         )
         return view.over([PORTRAIT_BACKGROUND] * 3).clamp(0, 1).cpu().numpy()
 
-    def sheet(self, rows: Mapping[str, Sequence[FloatArray]]) -> FloatArray:
-        """Rows of pictures with their names beneath, after the picture."""
+    def sides(self, painting: Painting, rule: Rule) -> dict[str, FloatArray]:
+        """Pictures from all sides, by name."""
+        return {side: self.portrait(painting, rule, sight) for side, sight in SIDES.items()}
+
+    def sheet(self, rows: Mapping[str, Mapping[str, FloatArray]]) -> FloatArray:
+        """Rows of pictures after the style, each with the names of its row and its own."""
         head = np.clip(fit(self.style, PORTRAIT_SIZE, PORTRAIT_SIZE), 0, 1)
         heads = [head, *[None] * (len(rows) - 1)]
-        pictures = [[first, *row] for first, row in zip(heads, rows.values(), strict=True)]
-        captions = [["", *[name] * len(row)] for name, row in rows.items()]
+        pictures = [[first, *row.values()] for first, row in zip(heads, rows.values(), strict=True)]
+        captions = [["", *(f"{name}, {each}" for each in row)] for name, row in rows.items()]
         return contact_sheet(pictures, captions)
 
 

@@ -8,7 +8,7 @@ Reference: VNCA section 4.3, "Comparison on weights for loss functions".
 
 from dataclasses import dataclass, replace
 
-from judge import SIDES, Judge, paint
+from judge import Judge, paint
 from study import Findings, Study, run
 
 from vnca.evaluation.estimators import dis, ours
@@ -28,14 +28,14 @@ def sweep(study: MotionWeight) -> None:
     seen_by = {"network": ours(), "DIS": dis()}
     findings, pictures = Findings(study, "motion_weight"), {}
     for weight in study.weights:
-        kind = f"λ = {weight:g}"
+        kind = f"lambda = {weight:g}"
         kind_config = replace(config, motion=replace(config.motion, weight=weight))
         for seed, rule in study.rules(f"motion_{weight:g}", kind_config):
             painting = paint(rule, smoke)
             moved = by_name(measure_motion(rule, smoke, seen_by))
             findings.add(kind, judge.around(painting, rule) | moved, seed=seed)
             if seed == study.seeds[0]:
-                pictures[kind] = [judge.portrait(painting, rule, s) for s in SIDES.values()]
+                pictures[kind] = judge.sides(painting, rule)
     findings.tell()
     study.picture("motion_weight", judge.sheet(pictures))
 

@@ -27,7 +27,7 @@ def compare(study: Study) -> None:
                 findings.add(kind, seen, seed=seed, on=side)
             findings.add(kind, judge.around(painting, rule), seed=seed, on="around")
             if seed == study.seeds[0]:
-                pictures[kind] = [judge.portrait(painting, rule, s) for s in SIDES.values()]
+                pictures[kind] = judge.sides(painting, rule)
     findings.tell()
     study.picture("views", judge.sheet(pictures))
 

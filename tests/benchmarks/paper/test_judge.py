@@ -91,6 +91,9 @@ def test_judging_again_gives_the_same(judge: Judge, tiny_smoke: Volume, rule: Ru
 
 def test_a_sheet_has_a_row_for_each_kind(judge: Judge) -> None:
     picture = np.zeros((192, 192, 3), np.float32)
-    one, two = (judge.sheet(rows) for rows in ({"a": [picture]}, {"a": [picture], "b": [picture]}))
+    one, two = (
+        judge.sheet(rows)
+        for rows in ({"a": {"c": picture}}, {"a": {"c": picture}, "b": {"c": picture}})
+    )
     assert two.shape[0] > 1.8 * one.shape[0]
     assert two.shape[1] == one.shape[1]
