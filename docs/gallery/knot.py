@@ -1,6 +1,6 @@
 """Makes a mesh to put textures on: a trefoil knot, tied from a tube.
 
-python docs/images/knot.py knot.obj
+python docs/gallery/knot.py knot.obj
 """
 
 import sys
