@@ -2,42 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
 from vnca.errors import GridError
-from vnca.evaluation.stage import Stage
+from vnca.evaluation.stage import Coloured, Pair, Sight, Stage
 from vnca.evaluation.style import StyleDistances, StyleGauge, gap_closed, mean_distances
 from vnca.stylize.config import StylizeConfig
-from vnca.stylize.roll import Painting, stylize
+from vnca.stylize.roll import stylize
 from vnca.typing import Box, FloatArray
 from vnca.volume import Volume
 
-OPAQUE = 0.8
-"""Opacity from which smoke is compared with the picture."""
 FEWEST_PIXELS = 64
 """Opaque pixels without which a view says nothing about style."""
 CUTOUTS = 3
 """Cut-outs of the picture for each view."""
-
-
-class Sight(NamedTuple):
-    """Where smoke is looked at from, degrees."""
-
-    azimuth: float
-    elevation: float
-
-
 SIDES = tuple(Sight(azimuth, 10.0) for azimuth in (0.0, 90.0, 180.0, 270.0))
-RING = tuple(Sight(15.0 * turn, 10.0) for turn in range(24))
-POLES = tuple(
-    Sight(azimuth, elevation)
-    for elevation in (60.0, -60.0)
-    for azimuth in (0.0, 90.0, 180.0, 270.0)
-)
+"""From where frames of a sequence are compared with the picture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +30,7 @@ class Likeness:
     Attributes:
         sights: Where each view was taken from.
         painted: The distance of each view of the painting.
-        plain: The mean distance of the same smoke in plain grey.
+        plain: The mean distance of the same smoke as it comes.
         cutout: The mean distance of parts of the picture in the shape of the smoke.
     """
 
@@ -59,7 +42,7 @@ class Likeness:
     @property
     def shares(self) -> list[float]:
         """The share of the gap that each view closes, by all measures together."""
-        return [gap_closed(d.total, self.plain.total, self.cutout.total) for d in self.painted]
+        return [gap_closed(distances, self.plain, self.cutout) for distances in self.painted]
 
     @property
     def gap_closed(self) -> float:
@@ -69,22 +52,28 @@ class Likeness:
     @property
     def spread(self) -> float:
         """Standard deviation of that share over the views, relative to its mean."""
-        return float(np.std(self.shares) / abs(np.mean(self.shares)))
+        return float(np.std(self.shares) / max(abs(np.mean(self.shares)), 1e-6))
 
     @property
     def by_measure(self) -> dict[str, float]:
-        """The share of the gap closed by each measure alone."""
-        ours = mean_distances(self.painted)
+        """The share of the gap closed by each measure alone, mean over the views."""
         return {
-            name: gap_closed(
-                getattr(ours, name), getattr(self.plain, name), getattr(self.cutout, name)
+            name: float(
+                np.mean(
+                    [
+                        gap_closed(
+                            d[at : at + 1], self.plain[at : at + 1], self.cutout[at : at + 1]
+                        )
+                        for d in self.painted
+                    ]
+                )
             )
-            for name in StyleDistances._fields
+            for at, name in enumerate(StyleDistances._fields)
         }
 
     @classmethod
     def joined(cls, parts: Sequence["Likeness"]) -> "Likeness":
-        """That of all views of several frames; each frame has as many."""
+        """That of the views of several frames, of which each has about as many."""
         return cls(
             tuple(sight for part in parts for sight in part.sights),
             tuple(distances for part in parts for distances in part.painted),
@@ -93,41 +82,28 @@ class Likeness:
         )
 
 
-def likeness(
-    stage: Stage, gauge: StyleGauge, painting: Painting, sights: Sequence[Sight]
-) -> Likeness:
-    """Compare views of a painted frame with the style picture.
-
-    Pixels count where the smoke is opaque, painted and unpainted.
+def likeness(gauge: StyleGauge, pairs: Sequence[Pair], frame: int) -> Likeness:
+    """Compare views of a frame with the style picture, where the smoke is opaque.
 
     Raises:
         GridError: If it is opaque nowhere.
     """
-    painted, plain, cutouts, seen = [], [], [], []
-    for sight in sights:
-        views = [
-            stage.look(density, colour, painting.smoke.origin, *sight)
-            for density, colour in (
-                (painting.density, painting.colour),
-                (painting.smoke.density, None),
-            )
-        ]
-        where = np.logical_and(*((view.opacity > OPAQUE).numpy() for view in views))
-        if where.sum() < FEWEST_PIXELS:
-            continue
-        ours, grey = (view.over(gauge.background.tolist()).numpy() for view in views)
-        seen.append(sight)
-        painted.append(gauge.distances(ours, where))
-        plain.append(gauge.distances(grey, where))
-        cutouts += [
-            gauge.distances(*part) for part in gauge.cutouts(where, CUTOUTS, seed=len(seen))
-        ]
-    if not seen:
+    pairs = [pair for pair in pairs if pair.where.sum() >= FEWEST_PIXELS]
+    if not pairs:
         raise GridError(
-            f"frame {painting.smoke.frame}: its smoke is opaque nowhere, so its style cannot be "
-            "measured; choose other frames"
+            f"frame {frame}: its smoke is opaque nowhere, so that its style cannot be measured; "
+            "choose other frames"
         )
-    return Likeness(tuple(seen), tuple(painted), mean_distances(plain), mean_distances(cutouts))
+    return Likeness(
+        tuple(pair.sight for pair in pairs),
+        tuple(gauge.distances(p.painted.over(gauge.background), p.where) for p in pairs),
+        mean_distances(gauge.distances(p.plain.over(gauge.background), p.where) for p in pairs),
+        mean_distances(
+            gauge.distances(*part)
+            for seed, pair in enumerate(pairs)
+            for part in gauge.cutouts(pair.where, CUTOUTS, seed)
+        ),
+    )
 
 
 def measure_style(
@@ -154,18 +130,18 @@ def measure_style(
         backend: What computes the automaton.
 
     Raises:
-        GridError: If a frame's smoke is opaque nowhere.
+        GridError: If there is no smoke, or a frame's smoke is opaque nowhere.
     """
     box = Box((0, 0, 0), (0, 0, 0))
     for smoke in frames:
         box = box.union(smoke.box)
-    stage, gauge = Stage.of(rule, box, size), StyleGauge(picture, round(size * style_scale))
+    stage = Stage.around(frames, rule, size)
+    gauge = StyleGauge(picture, round(size * style_scale))
     paintings = stylize(frames, rule, stepper(rule, backend), config or StylizeConfig(), box=box)
-    left = reversed(range(len(frames)))
-    return Likeness.joined(
-        [
-            likeness(stage, gauge, painting, SIDES)
-            for painting, remaining in zip(paintings, left, strict=True)
-            if remaining % every == 0
-        ]
-    )
+    parts = []
+    for at, painting in enumerate(paintings, 1):
+        if (len(frames) - at) % every == 0:
+            smoke = Coloured.painted(painting), Coloured.plain(painting.smoke)
+            pairs = [stage.look_twice(*smoke, sight) for sight in SIDES]
+            parts.append(likeness(gauge, pairs, painting.smoke.frame))
+    return Likeness.joined(parts)

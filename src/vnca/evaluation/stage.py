@@ -1,21 +1,104 @@
-"""Where the smoke of a sequence is looked at: cameras framed on all of it."""
+"""Where the smoke of a sequence is looked at, and what is seen of it."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
+from scipy.ndimage import gaussian_filter
 
-from vnca.automaton.rule import Rule
+from vnca.automaton.rule import SMOKE_THRESHOLD, Rule
 from vnca.camera import Orthographic, Perspective, frame_box
+from vnca.errors import GridError
 from vnca.render.velocity import projected_velocity
-from vnca.render.view import View, render
-from vnca.typing import AnyArray, Box, FloatArray, Index
+from vnca.render.view import render
+from vnca.stylize.roll import Painting
+from vnca.training.smoke_scene import smoke_bounds
+from vnca.typing import AnyArray, BoolArray, Box, FloatArray, Index
 from vnca.volume import Volume
 
-PLAIN = 0.2140411
-"""Linear grey of smoke that nothing has painted: sRGB ½, the colour of a state of zeros."""
+OPAQUE = 0.8
+"""Opacity from which a pixel counts as smoke."""
 STEP = 0.5
 """Distance between samples along a ray, cells."""
+_GREY = 0.214  # linear, of sRGB ½: what a state of zeros shows
+_LIGHT = np.array([-0.48, -0.36, 0.8], np.float32)  # towards it
+
+
+class Sight(NamedTuple):
+    """Where smoke is looked at from, degrees."""
+
+    azimuth: float
+    elevation: float
+
+
+class Coloured(NamedTuple):
+    """Smoke with a colour.
+
+    Attributes:
+        density: `[x, y, z]`, in the units of the file.
+        colour: Linear RGB `[x, y, z, 3]`.
+        origin: Index coordinates of the first cell.
+    """
+
+    density: FloatArray
+    colour: FloatArray
+    origin: Index
+
+    @classmethod
+    def painted(cls, painting: Painting) -> "Coloured":
+        """As a rule paints it."""
+        return cls(painting.density, painting.colour, painting.smoke.origin)
+
+    @classmethod
+    def plain(cls, smoke: Volume) -> "Coloured":
+        """As it comes: grey, lit from above, so that its shape can be seen.
+
+        Mid-grey on average over all directions that a surface can face.
+        """
+        slopes = np.zeros((*smoke.density.shape, 3), np.float32)
+        if min(smoke.density.shape) > 1:
+            gradient = np.gradient(gaussian_filter(smoke.density, 1.0), axis=(0, 1, 2))
+            slopes = np.stack(gradient, axis=-1)
+        steepness = np.linalg.norm(slopes, axis=-1, keepdims=True)
+        facing = -(slopes / np.maximum(steepness, 1e-6)) @ _LIGHT
+        shade = _GREY * (1 + facing / 2)
+        return cls(smoke.density, np.repeat(shade[..., None], 3, axis=-1), smoke.origin)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """One picture of smoke.
+
+    Attributes:
+        colour: Linear RGB `[r, c, 3]`, premultiplied by opacity.
+        opacity: `[r, c]`.
+        depth: `[r, c]`, of what is seen, cells; infinite where that is nothing.
+    """
+
+    colour: FloatArray
+    opacity: FloatArray
+    depth: FloatArray
+
+    def over(self, background: AnyArray | Sequence[float]) -> FloatArray:
+        """The picture in front of a linear RGB colour."""
+        behind = (1 - self.opacity)[..., None] * np.asarray(background, np.float32)
+        return (self.colour + behind).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """The same smoke seen from the same place, painted and as it comes."""
+
+    sight: Sight
+    painted: Seen
+    plain: Seen
+
+    @property
+    def where(self) -> BoolArray:
+        """Where it is opaque, both ways."""
+        return (self.painted.opacity > OPAQUE) & (self.plain.opacity > OPAQUE)
 
 
 @dataclass(frozen=True)
@@ -33,49 +116,65 @@ class Stage:
     size: int = 192
 
     @classmethod
-    def of(cls, rule: Rule, box: Box, size: int = 192) -> "Stage":
-        """As bright as the smoke that a rule was trained on."""
+    def around(cls, frames: Iterable[Volume], rule: Rule, size: int = 192) -> "Stage":
+        """Framed on what a rule takes for smoke, as bright as what it was trained on.
+
+        Raises:
+            GridError: If there is no smoke in any frame.
+        """
+        box = Box((0, 0, 0), (0, 0, 0))
+        for smoke in frames:
+            if (smoke.density > SMOKE_THRESHOLD * rule.scales.density).any():
+                box = box.union(smoke_bounds(smoke, rule.scales.density))
+        if box.is_empty:
+            raise GridError("there is no smoke in any frame; choose others")
         return cls(box, rule.scales.gamma / rule.scales.density, size)
 
-    def camera(self, origin: Index, azimuth: float, elevation: float) -> Orthographic | Perspective:
+    def camera(self, sight: Sight, origin: Index = (0, 0, 0)) -> Orthographic | Perspective:
         """The camera that sees all of the box, in coordinates of arrays that begin at `origin`."""
         lower, upper = (
             (np.subtract(corner, origin) - 0.5).tolist()
             for corner in (self.box.lower, self.box.upper)
         )
-        return frame_box(lower, upper, azimuth, elevation)
+        return frame_box(lower, upper, *sight)
 
     @torch.no_grad()
-    def look(
-        self,
-        density: FloatArray,
-        colour: FloatArray | None,
-        origin: Index,
-        azimuth: float,
-        elevation: float,
-    ) -> View:
-        """A view of smoke; `colour` is linear RGB `[x, y, z, 3]`, or None for plain grey."""
-        if colour is None:
-            colour = np.full((*density.shape, 3), PLAIN, np.float32)
-        return render(
-            torch.from_numpy(density),
-            torch.from_numpy(colour),
-            self.camera(origin, azimuth, elevation),
+    def look(self, smoke: Coloured, sight: Sight) -> Seen:
+        """A picture of smoke."""
+        if 0 in smoke.density.shape:
+            nothing = np.zeros((self.size, self.size), np.float32)
+            return Seen(
+                np.repeat(nothing[..., None], 3, -1), nothing, np.full_like(nothing, np.inf)
+            )
+        view = render(
+            torch.from_numpy(smoke.density),
+            torch.from_numpy(smoke.colour),
+            self.camera(sight, smoke.origin),
             rows=self.size,
             columns=self.size,
             gamma=self.gamma,
             step=STEP,
         )
+        return Seen(view.colour.numpy(), view.opacity.numpy(), view.depth.numpy())
 
-    def motion(self, smoke: Volume, azimuth: float, elevation: float) -> AnyArray:
-        """How the smoke is seen to move, pixels per frame to the right and down, `[r, c, 2]`."""
-        assert smoke.velocity is not None, "asked of smoke that has no velocity"
+    def look_twice(self, painted: Coloured, plain: Coloured, sight: Sight) -> Pair:
+        """Both from the same place."""
+        return Pair(sight, self.look(painted, sight), self.look(plain, sight))
+
+    def motion(self, smoke: Volume, sight: Sight) -> FloatArray | None:
+        """How smoke is seen to move, pixels per frame to the right and down, `[r, c, 2]`.
+
+        None where the smoke has no velocity.
+        """
+        if smoke.velocity is None or smoke.density.size == 0:
+            return None
         moved, _ = projected_velocity(
             torch.from_numpy(smoke.density),
             torch.from_numpy(smoke.velocity),
-            self.camera(smoke.origin, azimuth, elevation),
+            self.camera(sight, smoke.origin),
             rows=self.size,
             columns=self.size,
             gamma=self.gamma,
+            step=STEP,
         )
         return moved.numpy()

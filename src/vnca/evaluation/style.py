@@ -3,7 +3,7 @@
 Nothing here is learned: colours, filters drawn at random once and for all, and spectra.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ FILTER_SIZE = 7
 LEVELS = 3
 """Sizes at which texture is compared, each half the one before."""
 SLICES = 64
-"""Directions in which features are compared."""
+"""Directions in which colours, and responses of filters, are compared."""
 WINDOW = 32
 """Rows and columns of the windows whose spectrum is taken, pixels."""
 FEWEST = 32
@@ -29,6 +29,8 @@ FEWEST = 32
 _QUANTILES = 256
 _STRIDE = 8
 _COVERED = 0.9
+# Variance of the weakest direction of texture that counts in full, relative to the strongest.
+_WEAKEST = 0.01
 _SEED = 0
 
 # Linear sRGB to the responses of cones, and their cube roots to lightness and two opponents.
@@ -42,25 +44,22 @@ _OPPONENTS = (
     (1.9779984951, -2.4285922050, 0.4505937099),
     (0.0259040371, 0.7827717662, -0.8086757660),
 )
+# Distances of hue and chroma look about twice as large as OKLab has them.
+_CHROMA = (1.0, 2.0, 2.0)
 
 
 class StyleDistances(NamedTuple):
     """How far pixels are from the style picture, in units of its own variation.
 
-    A flat patch of its mean colour is about one from it by each measure, so that they add up.
+    What is flat and of its mean colour is about one from it by each measure: they add up.
     """
 
     palette: float
     """Sliced Wasserstein distance of the colours."""
     texture: float
-    """Sliced Wasserstein distance of the features of random filters, mean over sizes."""
+    """Sliced Wasserstein distance of what random filters see, mean over sizes."""
     spectrum: float
     """Difference of the radial amplitude spectra, relative to the picture's."""
-
-    @property
-    def total(self) -> float:
-        """Their sum."""
-        return sum(self)
 
 
 def mean_distances(distances: Iterable[StyleDistances]) -> StyleDistances:
@@ -69,19 +68,23 @@ def mean_distances(distances: Iterable[StyleDistances]) -> StyleDistances:
     return StyleDistances(palette, texture, spectrum)
 
 
-def gap_closed(painted: float, plain: float, cutout: float) -> float:
-    """1 − (painted − cutout) / (plain − cutout): the share of the way to the picture.
+def gap_closed(painted: Sequence[float], plain: Sequence[float], cutout: Sequence[float]) -> float:
+    """1 − Σ (painted − cutout)₊ / Σ (plain − cutout)₊: the share of the way to the picture.
 
-    1 for what is as near to the picture as its own parts are, 0 for plain smoke, negative for
-    what is farther away than that.
+    1 for what is as near to the picture as its own parts are, by every measure; 0 for smoke as it
+    comes; negative for what is farther away than that. What is nearer than the picture's own
+    parts are, because it shows more of the palette than any of them, makes up for nothing.
 
     Args:
-        painted: Distance of the painted smoke from the picture.
-        plain: That of the same smoke in grey.
-        cutout: That of parts of the picture, cut out in the shape of the smoke.
+        painted: Distances of the painted smoke from the picture, an entry for each measure.
+        plain: Those of the same smoke as it comes.
+        cutout: Those of parts of the picture, cut out in the shape of the smoke.
     """
-    gap = plain - cutout
-    return 1 - (painted - cutout) / gap if gap > 0 else float(painted <= cutout)
+    left, gap = (
+        sum(max(far - near, 0.0) for far, near in zip(distances, cutout, strict=True))
+        for distances in (painted, plain)
+    )
+    return 1 - left / gap if gap > 0 else float(left == 0)
 
 
 class StyleGauge:
@@ -116,34 +119,37 @@ class StyleGauge:
         self.picture = resize(picture, round(rows * factor), round(columns * factor)).clip(0, 1)
         self.background = self.picture.mean((0, 1))
         random = np.random.default_rng(_SEED)
-        self._filters = _filters(random)
-        self._slices = _directions(random, FILTERS, SLICES)
         self._hues = _directions(random, 3, SLICES)
+        colours = perceived(self.picture)
         everywhere = np.ones(self.picture.shape[:2], dtype=bool)
-        self._colours, *self._textures = (
-            _Distribution.of(values) for values in self._slicings(self.picture, everywhere)
-        )
-        self._spectrum = _spectrum(to_oklab(self.picture), everywhere)
+        self._palette = _Distribution.of(colours[everywhere] @ self._hues)
+        self._textures = [
+            _Texture.of(_filtered(maps, inside, filters), filters, random)
+            for maps, inside in _levels(colours, everywhere)
+            for filters in [_filters(random)]
+        ]
+        self._spectrum = _spectrum(colours, everywhere)
 
     def distances(self, picture: FloatArray, where: BoolArray) -> StyleDistances:
         """How far the chosen pixels of a picture are from the style picture.
 
-        Features that also see other pixels are left out; a size in which none remain, too.
+        What a filter sees that also sees other pixels is left out; a size in which too little
+        remains, too.
 
         Args:
             picture: Linear RGB `[r, c, 3]`.
             where: `[r, c]`, some of them true.
         """
-        colours, *textures = self._slicings(picture, where)
-        compared = [
-            style.distance(values)
-            for style, values in zip(self._textures, textures, strict=True)
-            if len(values) >= FEWEST
+        colours = perceived(picture)
+        textures = [
+            texture.distribution.distance(values)
+            for texture, (maps, inside) in zip(self._textures, _levels(colours, where), strict=True)
+            if len(values := _filtered(maps, inside, texture.filters)) >= FEWEST
         ]
-        spectrum = _spectrum(to_oklab(picture), where)
+        spectrum = _spectrum(colours, where)
         return StyleDistances(
-            palette=self._colours.distance(colours),
-            texture=float(np.mean(compared)) if compared else 0.0,
+            palette=self._palette.distance(colours[where] @ self._hues),
+            texture=float(np.mean(textures)) if textures else 0.0,
             spectrum=float(np.abs(spectrum - self._spectrum).sum() / self._spectrum.sum()),
         )
 
@@ -170,25 +176,6 @@ class StyleGauge:
             if mask.any():
                 yield self.picture[y : y + rows, x : x + columns], mask
 
-    def _slicings(self, picture: FloatArray, where: BoolArray) -> Iterator[AnyArray]:
-        """Colours, and the features of each size, along random directions: `[n, slices]`."""
-        colours = to_oklab(picture)
-        yield colours[where] @ self._hues
-        maps = torch.from_numpy(np.ascontiguousarray(colours.transpose(2, 0, 1), np.float32))[None]
-        inside = torch.from_numpy(where.astype(np.float32))[None, None]
-        for level in range(LEVELS):
-            if level:
-                maps, inside = functional.avg_pool2d(maps, 2), -functional.max_pool2d(-inside, 2)
-            yield self._features(maps, inside)
-
-    @torch.no_grad()
-    def _features(self, maps: Tensor, inside: Tensor) -> AnyArray:
-        if min(maps.shape[2:]) < FILTER_SIZE:
-            return np.zeros((0, SLICES), np.float32)
-        seen = -functional.max_pool2d(-inside, FILTER_SIZE, stride=1)[0, 0] > 0.5
-        features = functional.conv2d(maps, self._filters)[0].relu()[:, seen]
-        return features.numpy().T @ self._slices
-
 
 class _Distribution(NamedTuple):
     """Values along each direction in ascending order, and how widely they are spread."""
@@ -205,13 +192,52 @@ class _Distribution(NamedTuple):
         return float(np.abs(_quantiles(values) - self.quantiles).mean()) / self.spread
 
 
-def to_oklab(linear: AnyArray) -> AnyArray:
-    """Linear RGB `[..., 3]` as OKLab, in which equal distances look alike.
+class _Texture(NamedTuple):
+    """What filters of one size see in the style picture."""
 
-    Reference: Ottosson 2020.
+    filters: Tensor
+    distribution: _Distribution
+
+    @classmethod
+    def of(cls, seen: AnyArray, filters: Tensor, random: np.random.Generator) -> "_Texture":
+        """Of what random filters see, `[n, FILTERS]`.
+
+        They are mixed at random so that the responses to the picture are as strong in all
+        directions: otherwise slow changes of brightness would drown all finer texture.
+        """
+        strengths, axes = np.linalg.eigh(np.atleast_2d(np.cov(seen.T)))
+        floor = _WEAKEST * strengths[-1] or 1.0
+        mix = axes / np.sqrt(strengths + floor) @ _directions(random, FILTERS, SLICES)
+        mixed = torch.einsum("fs,fcij->scij", torch.from_numpy(mix.astype(np.float32)), filters)
+        return cls(mixed, _Distribution.of(seen @ mix))
+
+
+def perceived(linear: AnyArray) -> AnyArray:
+    """Linear RGB `[..., 3]` as lightness and two opponents, in which equal distances look alike.
+
+    Reference: Ottosson 2020 (OKLab), with the scale of ΔE OK2 in CSS Color 4.
     """
     cones = np.clip(linear, 0, None) @ np.array(_CONES, np.float32).T
-    return np.cbrt(cones) @ np.array(_OPPONENTS, np.float32).T
+    return np.cbrt(cones) @ (np.array(_OPPONENTS, np.float32).T * np.array(_CHROMA, np.float32))
+
+
+def _levels(colours: AnyArray, where: BoolArray) -> Iterator[tuple[Tensor, Tensor]]:
+    """A picture `[1, 3, r, c]` and its chosen pixels `[1, 1, r, c]`, each half as large."""
+    maps = torch.from_numpy(np.ascontiguousarray(colours.transpose(2, 0, 1), np.float32))[None]
+    inside = torch.from_numpy(where.astype(np.float32))[None, None]
+    yield maps, inside
+    for _ in range(1, LEVELS):
+        maps, inside = functional.avg_pool2d(maps, 2), -functional.max_pool2d(-inside, 2)
+        yield maps, inside
+
+
+@torch.no_grad()
+def _filtered(maps: Tensor, inside: Tensor, filters: Tensor) -> AnyArray:
+    """Responses `[n, filters]` where a filter sees nothing but chosen pixels."""
+    if min(maps.shape[2:]) < FILTER_SIZE:
+        return np.zeros((0, len(filters)), np.float32)
+    seen = -functional.max_pool2d(-inside, FILTER_SIZE, stride=1)[0, 0] > 0.5
+    return functional.conv2d(maps, filters)[0, :, seen].numpy().T
 
 
 def _quantiles(values: AnyArray) -> AnyArray:
