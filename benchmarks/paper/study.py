@@ -135,6 +135,7 @@ class Study:
                     preview_every=config.iterations,
                     device=str(self.place),
                     preset=self.preset,
+                    texture=0,  # as the paper trains
                     smoke=self.smoke,
                     config=config,
                 )

@@ -22,6 +22,7 @@ TINY = (
     *("--iterations", "2", "--hidden", "8", "--channels", "6", "--view.size", "32"),
     *("--shortest-rollout", "2", "--longest-rollout", "3", "--appearance.samples", "64"),
     *("--appearance.layers", "relu1_1", "relu2_1", "--device", "cpu"),
+    *("--texture", "0"),
 )
 """Options of a training that takes a moment."""
 

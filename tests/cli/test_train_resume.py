@@ -239,3 +239,73 @@ def test_out_of_memory_before_training_is_one_line(
     assert "out of memory" in complaint
     assert "--view.size 300000" in complaint
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("when", ["in the texture", "between", "in the smoke"])
+def test_a_training_that_begins_with_a_texture_goes_on_from_anywhere(
+    vnca: Vnca,
+    frame: Path,
+    style: Path,
+    tiny: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    when: str,
+) -> None:
+    options = [*tiny, "--texture", 1.5]  # three iterations, then two on smoke
+    whole, run = tmp_path / "whole", tmp_path / "run"
+    assert vnca("train", frame, style, "--out", whole, *options).code == 0
+    assert Model.load(whole / "texture").training["iterations"] == 3
+    assert Model.load(whole).training["iterations"] == 2
+    improve, left = Trainer.improve, {"in the texture": 2, "between": 3, "in the smoke": 4}[when]
+    done = 0
+
+    def interrupted(self: Trainer) -> Progress:
+        nonlocal done
+        if done == left:
+            raise KeyboardInterrupt
+        done += 1
+        return improve(self)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Trainer, "improve", interrupted)
+        stopped = vnca("train", frame, style, "--out", run, *options)
+    assert stopped.code == 130
+    assert f"vnca train --resume {run}" in stopped.err
+    assert vnca("train", "--resume", run).code == 0
+    assert (run / MODEL_NAME).read_bytes() == (whole / MODEL_NAME).read_bytes()
+    assert not (run / CHECKPOINT_NAME).exists()
+
+
+def test_inputs_that_change_while_the_texture_is_trained_are_refused(
+    vnca: Vnca,
+    frame: Path,
+    smoke: Path,
+    style: Path,
+    tiny: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def stop(self: Trainer) -> Progress:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Trainer, "improve", stop)
+        vnca("train", frame, style, "--out", tmp_path / "run", *tiny, "--texture", 1)
+    another = smoke / "ball_0003.vdb"
+    complaint = vnca("train", "--resume", tmp_path / "run", "--frame", another).complaint
+    assert "the frame changed since this training began" in complaint
+
+
+def test_what_begins_with_a_texture_differs_from_what_does_not(
+    vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
+) -> None:
+    for name, texture in (("with", 1), ("without", 0)):
+        options = [*tiny, "--texture", texture]
+        assert vnca("train", frame, style, "--out", tmp_path / name, *options).code == 0
+    one, two = (Model.load(tmp_path / name).rule for name in ("with", "without"))
+    assert not (one.output == two.output).all()
+    assert not (tmp_path / "without" / "texture").exists()
+
+
+def test_a_share_of_texture_below_zero_is_refused(vnca: Vnca, frame: Path, style: Path) -> None:
+    assert "--texture -1" in vnca("train", frame, style, "--out", "x", "--texture", -1).complaint

@@ -149,6 +149,7 @@ def ablate(options: Ablation) -> None:
                     options.style,
                     out=folder,
                     preset=options.preset,
+                    texture=0,  # as the paper trains
                     overwrite=True,
                     device=options.device,
                     smoke=options.smoke,

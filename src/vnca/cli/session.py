@@ -241,6 +241,8 @@ def run_folder(path: Path, *, overwrite: bool, checkpoint: Checkpoint | None) ->
     """
     if checkpoint is None:
         return RunFolder(path, overwrite=overwrite)
+    if not checkpoint.training:  # It was interrupted before its first iteration.
+        return RunFolder(path, resumed_from=0)
     try:
         iteration = int(checkpoint.training["trainer"].values["iteration"])
     except (KeyError, TypeError, ValueError) as error:

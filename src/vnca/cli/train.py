@@ -9,7 +9,10 @@ from typing import Annotated, Any, Literal
 import torch
 import tyro
 
-from vnca.cli.options import chosen, is_given, parse
+from vnca.automaton.model import MODEL_NAME, Model
+from vnca.automaton.rule import Rule
+from vnca.cli import texture_train
+from vnca.cli.options import chosen, is_given, parse, say
 from vnca.cli.sequence import beside
 from vnca.cli.session import (
     ResumeOptions,
@@ -22,16 +25,20 @@ from vnca.cli.session import (
     judged_by,
     run_folder,
 )
-from vnca.errors import GridError
+from vnca.errors import GridError, OptionError
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image
 from vnca.io.smoke import SmokeFormat, read_smoke
-from vnca.training.checkpoint import Checkpoint, fingerprints
+from vnca.texturing.beginning import SHARES, beginning_config, deaf_to_priors
+from vnca.texturing.config import TextureConfig
+from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.memory import memory_budget
 from vnca.training.smoke import smoke_trainer
 
 COMMAND = "train"
+TEXTURE_FOLDER = "texture"
+"""Folder, in that of a run, of the texture that it begins with."""
 
 
 @dataclass(frozen=True)
@@ -47,10 +54,18 @@ class Train(TrainingOptions):
     """The picture: PNG, JPEG or WebP."""
     preset: Literal["draft", "standard", "paper"] = "draft"
     """Values of all options below that are not given."""
+    texture: float | None = None
+    """Iterations on a solid texture of the picture for each one on the smoke, made before those:
+    patterns come from there. 0 begins with nothing."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=TrainConfig)
     """Hyperparameters."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.texture is not None and not 0 <= self.texture <= 1000:
+            raise OptionError(f"--texture {self.texture:g}: must be from 0 to 1000")
 
 
 @dataclass(frozen=True)
@@ -120,6 +135,16 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         asked=asked(dataclasses.replace(options, smoke=smoke_format)),
         preview_every=options.preview_every,
     )
+    if checkpoint is None or not checkpoint.training:
+        if checkpoint is not None:
+            checkpoint.require(session.inputs, folder.path / CHECKPOINT_NAME)
+        share = SHARES[options.preset] if options.texture is None else options.texture
+        beginning = beginning_config(config, share, max(trainer.scene.domain.box.shape))
+        if beginning is not None:
+            folder.reserve(Checkpoint({}, session.inputs, COMMAND, session.asked))
+            texture = _texture(options, beginning, goes_on=checkpoint is not None)
+            trainer.begin_with(deaf_to_priors(texture))
+        checkpoint = None
     notes = []
     if config.motion.weight and not trainer.teaches_motion:
         notes.append(
@@ -127,6 +152,34 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         )
     session.run(checkpoint, *notes)
     return options.out
+
+
+def _texture(options: Train, config: TextureConfig, *, goes_on: bool) -> Rule:
+    """The texture to begin with, from the folder in the run's where it is, or may be already."""
+    out = options.out / TEXTURE_FOLDER
+    say(f"first, a solid texture: {out}")
+    try:
+        if goes_on and (out / CHECKPOINT_NAME).exists():
+            again = texture_train.ResumeTexture(
+                resume=out, style=options.style, memory_budget=options.memory_budget
+            )
+            texture_train.resume(again)
+        elif not (goes_on and (out / MODEL_NAME).exists()):
+            texture_train.train(
+                texture_train.TrainTexture(
+                    options.style,
+                    config=config,
+                    out=out,
+                    overwrite=options.overwrite or goes_on,
+                    preview_every=options.preview_every,
+                    device=options.device,
+                    memory_budget=options.memory_budget,
+                )
+            )
+    except KeyboardInterrupt:
+        say(f"to go on with all of it: vnca {COMMAND} --resume {options.out}")
+        raise
+    return Model.load(out).rule
 
 
 def resume(options: Resume) -> Path:

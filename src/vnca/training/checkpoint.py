@@ -39,7 +39,7 @@ class Checkpoint:
     """A training that was left, and what it was about.
 
     Attributes:
-        training: What `Trainer.snapshot` gave.
+        training: What `Trainer.snapshot` gave; nothing if training had not begun.
         inputs: What `fingerprints` gave.
         command: The command that began it.
         options: What was asked for, to ask for it again; JSON values.
@@ -124,16 +124,24 @@ class Checkpoint:
             OptionError: If an input is not what it was.
             FileFormatError: If the checkpoint is damaged.
         """
+        self.require(inputs, path)
+        try:
+            trainer.restore(self.training)
+        except (KeyError, OverflowError, RuntimeError, TypeError, ValueError) as error:
+            raise FileFormatError(f"{path}: the checkpoint is damaged ({error})") from error
+
+    def require(self, inputs: Mapping[str, str], path: Path) -> None:
+        """Hold inputs to those of the training that was left; arguments as of `resume`.
+
+        Raises:
+            OptionError: If an input is not what it was.
+        """
         changed = [name for name, print_ in inputs.items() if self.inputs.get(name) != print_]
         if changed:
             raise OptionError(
                 f"{path}: the {' and the '.join(changed)} changed since this training began; put "
                 "back what was there, or train anew with --overwrite"
             )
-        try:
-            trainer.restore(self.training)
-        except (KeyError, OverflowError, RuntimeError, TypeError, ValueError) as error:
-            raise FileFormatError(f"{path}: the checkpoint is damaged ({error})") from error
 
 
 def _of_part(tensors: Mapping[str, Tensor], part: str) -> dict[str, Tensor]:

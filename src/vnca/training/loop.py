@@ -120,6 +120,15 @@ class Trainer:
         self._before: dict[str, Snapshot] | None = None  # the iteration that is under way
         self.kept_states = states_to_keep(scene, config, memory_budget)
 
+    def begin_with(self, rule: Rule) -> None:
+        """Take over the weights of a rule of the same shape, before the first iteration."""
+        with torch.no_grad():
+            for ours, theirs in zip(
+                self._weights, (rule.hidden, rule.bias, rule.output), strict=True
+            ):
+                ours.copy_(torch.from_numpy(theirs))
+        self._descent = Descent(self._weights)
+
     @property
     def teaches_motion(self) -> bool:
         """Whether the rule learns to move as the smoke does."""

@@ -62,10 +62,7 @@ class RunFolder:
         Raises:
             OutputError: If it cannot be written.
         """
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
+        self._make()
         if self._overwrite:
             for old in chain.from_iterable(map(self.path.glob, _OF_ONE_RUN)):
                 remove_file(old)
@@ -80,6 +77,21 @@ class RunFolder:
     ) -> None:
         """End the loss curves."""
         self._curves.close()
+
+    def reserve(self, checkpoint: Checkpoint) -> None:
+        """Make the folder for a training that is yet to begin, and write what was asked of it.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        self._make()
+        self.keep(checkpoint)
+
+    def _make(self) -> None:
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
 
     def start(self, config: CourseConfig, training: dict[str, Any]) -> None:
         """Write what was asked for: resolved configuration, inputs, version and device."""

@@ -1,0 +1,40 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vnca.automaton.rule import PRIORS, Rule, Scales
+from vnca.losses.appearance import AppearanceConfig
+from vnca.texturing.beginning import LARGEST_PICTURE, SHARES, beginning_config, deaf_to_priors
+from vnca.training.config import PRESETS
+
+
+def test_the_texture_is_of_the_rule_and_the_picture_that_smoke_is_trained_with() -> None:
+    config = replace(
+        PRESETS["draft"], iterations=50, seed=3, appearance=AppearanceConfig(style_scale=0.75)
+    )
+    texture = beginning_config(config, 2.5, cells=80)
+    assert texture is not None
+    assert texture.iterations == 125
+    assert texture.seed == 3
+    assert texture.rule.hidden == config.rule.hidden
+    assert texture.rule.sobel_divisor == config.rule.sobel_divisor
+    assert texture.appearance.style_scale * texture.slices.size == pytest.approx(60)
+
+
+def test_the_patterns_of_a_large_picture_are_kept_within_the_block() -> None:
+    texture = beginning_config(PRESETS["standard"], 1, cells=1000)
+    assert texture is not None
+    assert texture.appearance.style_scale * texture.slices.size == LARGEST_PICTURE
+
+
+def test_the_paper_begins_with_nothing() -> None:
+    assert beginning_config(PRESETS["paper"], SHARES["paper"], cells=64) is None
+
+
+def test_a_rule_that_is_deaf_to_priors_is_otherwise_the_same() -> None:
+    rule = Rule.initial(PRESETS["draft"].rule, Scales(), seed=0)
+    deaf = deaf_to_priors(rule)
+    assert not deaf.hidden[:, -PRIORS:].any()
+    np.testing.assert_array_equal(deaf.hidden[:, :-PRIORS], rule.hidden[:, :-PRIORS])
+    assert rule.hidden[:, -PRIORS:].all()
