@@ -66,6 +66,7 @@ def demonstrate(options: Demo) -> None:
                 style,
                 out=run_folder,
                 overwrite=True,
+                texture=1.0 if options.quick else None,
                 config=_config(options),
             )
         )

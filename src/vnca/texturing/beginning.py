@@ -11,7 +11,7 @@ from vnca.automaton.rule import PRIORS, Rule
 from vnca.texturing.config import PRESETS, TextureConfig
 from vnca.training.config import TrainConfig
 
-SHARES = {"draft": 3.0, "standard": 3.0, "paper": 0.0}
+SHARES = {"draft": 4.0, "standard": 3.0, "paper": 0.0}
 """Iterations on the texture for each on smoke, by preset."""
 LARGEST_PICTURE = 128
 """Cells along the shorter side of the picture, at most: its patterns are to fit the block."""
