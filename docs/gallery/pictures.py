@@ -62,9 +62,11 @@ def palette(value: AnyArray, *colours: str) -> AnyArray:
     return np.stack([np.interp(value, places, stops[:, channel]) for channel in range(3)], -1)
 
 
-def combed(generator: np.random.Generator, along: AnyArray, length: int) -> AnyArray:
+def combed(
+    generator: np.random.Generator, along: AnyArray, *, width: float, length: int
+) -> AnyArray:
     """White noise drawn out along a direction (radians), as bristles draw paint; 0 to 1."""
-    stroke = gaussian_filter(generator.normal(size=(WORK, WORK)), 1.5, mode="wrap")
+    stroke = gaussian_filter(generator.normal(size=(WORK, WORK)), width, mode="wrap")
     total = stroke.copy()
     for sign in (-1, 1):
         rows, columns = np.indices((WORK, WORK), float)
@@ -118,9 +120,9 @@ def stained_glass(generator: np.random.Generator) -> AnyArray:
 def ink_waves(generator: np.random.Generator) -> AnyArray:
     """Indigo lines on paper that flow around each other."""
     rows, columns = np.indices((WORK, WORK), float)
-    height = 120 * noise(generator, 240) + 28 * noise(generator, 90)
-    phase = 2 * np.pi * (rows * 15 + columns * 6) / WORK + height / 11
-    width = 0.15 + 0.55 * (0.5 + 0.5 * np.tanh(1.4 * noise(generator, 150)))
+    height = 120 * noise(generator, 300)
+    phase = 2 * np.pi * (rows * 8 + columns * 3) / WORK + height / 26
+    width = 0.3 + 0.3 * (0.5 + 0.5 * np.tanh(1.4 * noise(generator, 150)))
     line = 1 / (1 + np.exp((np.sin(phase) + 1 - 2 * width) / 0.12))
     wash = np.clip(0.5 + 0.3 * noise(generator, 120), 0, 1)
     paper = palette(wash, "f6efe0", "efe3c8", "b9d2d6")
@@ -130,11 +132,11 @@ def ink_waves(generator: np.random.Generator) -> AnyArray:
 
 def ember_strokes(generator: np.random.Generator) -> AnyArray:
     """Thick strokes of fire that whirl."""
-    height = noise(generator, 190)
+    height = noise(generator, 320)
     down, right = np.gradient(height)
-    strokes = combed(generator, np.arctan2(right, -down), 22)
-    heat = 0.5 + 0.22 * warped(noise(generator, 150), 40 * height, 40 * height)
-    value = np.clip(heat + 0.55 * (strokes - 0.5), 0, 1)
+    strokes = combed(generator, np.arctan2(right, -down), width=7, length=40)
+    heat = 0.5 + 0.1 * warped(noise(generator, 240), 40 * height, 40 * height)
+    value = np.clip(heat + 0.95 * (strokes - 0.5), 0, 1)
     return palette(value, "12061f", "3d0c4a", "9b1d3a", "e4572e", "ffb627", "fff1b8")
 
 

@@ -11,17 +11,16 @@ import sys
 from pathlib import Path
 
 import knot
-import pictures
+from workshop import HERE, drawn, made
 
-from vnca.cli import main as vnca
 from vnca.io.image import fit, read_image, write_image
 from vnca.io.mesh import read_mesh
 from vnca.io.sheet import contact_sheet
 from vnca.texturing.turntable import Turntable, TurntableConfig, textured
+from vnca.typing import FloatArray
 
-HERE = Path(__file__).parent
 FILMS = HERE / "textures"
-FILM = ("--rows", "200", "--columns", "200", "--frames", "36", "--fps", "12")
+FILM = ("--rows", 200, "--columns", 200, "--frames", 36, "--fps", 12)
 SIZE = 240
 """Rows and columns of a picture in the sheet."""
 AZIMUTHS = (0.0, 150.0)
@@ -32,34 +31,23 @@ def main(folder: str) -> None:
     work = Path(folder)
     for sub in (work, FILMS):
         sub.mkdir(parents=True, exist_ok=True)
-    if not all((work / f"{name}.png").exists() for name in pictures.PICTURES):
-        pictures.main(folder)
     knot.main(str(work / "knot.obj"))
     meshes = {"bunny": HERE / "stanford_bunny.obj", "knot": work / "knot.obj"}
     rows = []
-    for name in pictures.PICTURES:
-        picture, run = work / f"{name}.png", work / f"texture_{name}"
-        if not (run / "model.safetensors").exists():
-            made("texture", "train", picture, "--out", run)
+    for name, picture in drawn(work).items():
+        run = work / f"texture_{name}"
+        made(run / "model.safetensors", "texture", "train", picture, "--out", run)
         row = [fit(read_image(picture), SIZE, SIZE)]
         for mesh, source in meshes.items():
             baked, film = work / f"{name}_{mesh}.glb", FILMS / f"{name}_{mesh}.webp"
-            if not baked.exists():
-                made("texture", "bake", run, source, "--out", baked, "--block", 96)
-            if not film.exists():
-                made("texture", "turntable", baked, "--out", film, *FILM)
+            made(baked, "texture", "bake", run, source, "--out", baked, "--block", 96)
+            made(film, "texture", "turntable", baked, "--out", film, *FILM)
             row += portraits(baked)
         rows.append(row)
     write_image(FILMS / "sheet.jpg", contact_sheet(rows, background=(0.9, 0.9, 0.9)))
 
 
-def made(*arguments: object) -> None:
-    """Run a subcommand, or end with its exit code."""
-    if code := vnca([str(argument) for argument in arguments]):
-        sys.exit(code)
-
-
-def portraits(baked: Path) -> list:
+def portraits(baked: Path) -> list[FloatArray]:
     """A textured mesh from two sides."""
     mesh = read_mesh(baked)
     sides = [TurntableConfig(rows=SIZE, columns=SIZE, azimuth=azimuth) for azimuth in AZIMUTHS]
