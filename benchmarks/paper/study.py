@@ -14,7 +14,7 @@ import torch
 import tyro
 
 from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule
+from vnca.automaton.rule import Rule, RuleConfig
 from vnca.bench.machine import run_facts
 from vnca.bench.records import append_csv
 from vnca.cli.session import choose_device
@@ -24,15 +24,18 @@ from vnca.files import existing_file, writable_folder
 from vnca.io.image import write_image
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.training.checkpoint import CHECKPOINT_NAME
-from vnca.training.config import PRESETS, TrainConfig
+from vnca.training.config import PRESETS, TrainConfig, ViewConfig
+from vnca.training.course import PoolConfig
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
 ROOT = Path(__file__).parents[2]
 REFERENCE = "reference"
 """The rule that nothing was taken from; all studies share it."""
-DRAFT_SIZE = 96
-"""Rows and columns of a view: fewer than in the preset `draft`, for many runs on two cores."""
+DRAFT = TrainConfig(
+    rule=RuleConfig(position_prior=False), view=ViewConfig(size=96), pool=PoolConfig(size=16)
+)
+"""A training from nothing, small enough for many on two cores."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +49,9 @@ class Study:
     style: Path = ROOT / "src" / "vnca" / "data" / "vangogh_cafe_terrace.webp"
     """The picture."""
     full: bool = False
-    """The preset `paper` on a GPU; else `draft`, in smaller views."""
+    """The preset `paper` on a GPU; else a small training."""
     iterations: int | None = None
-    """Iterations of training, if not those of the preset."""
+    """Iterations of training, if not 400, or those of the preset."""
     size: int | None = None
     """Rows and columns of a view in training and judging; 96, or those of the preset if --full."""
     seeds: tuple[int, ...] = (0, 1)
@@ -76,13 +79,12 @@ class Study:
     @property
     def config(self) -> TrainConfig:
         """That of the reference."""
-        preset = PRESETS[self.preset]
-        size = preset.view.size if self.full else DRAFT_SIZE
+        plan = PRESETS["paper"] if self.full else DRAFT
         return replace(
-            preset,
-            iterations=preset.iterations if self.iterations is None else self.iterations,
+            plan,
+            iterations=plan.iterations if self.iterations is None else self.iterations,
             features=self.features,
-            view=replace(preset.view, size=size if self.size is None else self.size),
+            view=replace(plan.view, size=plan.view.size if self.size is None else self.size),
         )
 
     @cached_property

@@ -187,6 +187,8 @@ def main() -> None:
 
     def tell(task: Task, method: str, size: int, found: dict[str, Any]) -> None:
         rows.append({"style": task.style.name, "method": method, "size": size, **found})
+        if options.csv is not None:
+            append_csv(options.csv, facts, rows[-1:])
         print(
             f"{task.style.name:<32}{method:<11}{size:>5}{found['learn_s']:>9}{found['make_s']:>8}"
             f"{found['peak_mb']:>7}{found['axis']:>8}{found['oblique']:>9}{found['unseen']:>8}"
@@ -212,8 +214,6 @@ def main() -> None:
 
     if options.json is not None:
         write_json(options.json, facts, rows)
-    if options.csv is not None:
-        append_csv(options.csv, facts, rows)
 
 
 if __name__ == "__main__":
