@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo test test-slow test-faults sanitize fuzz audit check format lock bench bench-flow clean
+.PHONY: setup demo gallery paper test test-slow test-faults sanitize fuzz audit check format lock bench bench-flow clean
 
 setup: $(READY)
 
@@ -21,6 +21,17 @@ $(READY): $(LOCKS) pyproject.toml
 
 demo: setup
 	$(BIN)/vnca demo --out demo
+
+# Hours on two cores. What is in build/gallery already is not made again.
+gallery: setup
+	$(BIN)/python docs/gallery/textures.py build/gallery
+	$(BIN)/python docs/gallery/smoke.py build/gallery
+
+# The paper's evidence. FULL=--full takes its sizes, for a GPU.
+paper: setup
+	for study in density views motion_weight brightness generalisation cost; do \
+	  $(BIN)/python benchmarks/paper/$$study.py --out build/paper $(FULL) || exit 1; \
+	done
 
 test: setup
 	$(BIN)/pytest -m "not slow"

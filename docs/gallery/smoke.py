@@ -1,0 +1,54 @@
+"""Makes the smoke half of the gallery: a film a picture and scene.
+
+    python docs/gallery/smoke.py WORK
+
+Simulates a plume, jets and a ring, trains a rule for each of eight pictures on one frame of the
+plume, and paints and films all three with it: two scenes it never saw. What is in the folder WORK
+already is not made again. Films go to `smoke/`, beside this file.
+"""
+
+import sys
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from workshop import HERE, drawn, made
+
+FILMS = HERE / "smoke"
+SCENES = {"plume": (48, 40), "jets": (48, 40), "ring": (48, 40)}
+"""Cells across a scene, and frames."""
+TRAINED = "plume_0030.vdb"
+PAINTINGS = ("vangogh_church_auvers", "vangogh_harvest")
+FILM = ("--film.rows", 200, "--film.columns", 200, "--film.fps", 12)
+
+
+def main(folder: str) -> None:
+    """Make what is missing."""
+    work = Path(folder)
+    for sub in (work, FILMS):
+        sub.mkdir(parents=True, exist_ok=True)
+    for scene, (cells, frames) in SCENES.items():
+        smoke = work / scene
+        last = smoke / f"{scene}_{frames:04d}.vdb"
+        size = ("--resolution", cells, "--frames", frames)
+        made(last, "simulate", scene, "--out", smoke, *size)
+    with as_file(files("vnca.data") / "vangogh_cafe_terrace.webp") as terrace:
+        paintings = [terrace, *(HERE / f"{name}.webp" for name in PAINTINGS)]
+        for picture in [*drawn(work).values(), *paintings]:
+            films_of(picture, work)
+
+
+def films_of(picture: Path, work: Path) -> None:
+    """Train on the plume, paint all scenes."""
+    name = picture.stem
+    run = work / f"smoke_{name}"
+    made(run / "model.safetensors", "train", work / "plume" / TRAINED, picture, "--out", run)
+    for scene, (_, frames) in SCENES.items():
+        painted, film = work / f"{name}_{scene}", FILMS / f"{name}_{scene}.webp"
+        last = painted / f"{scene}_{frames:04d}.vdb"
+        some = ("--frames", f"{frames // 4}-{frames}")
+        made(last, "stylize", run, work / scene, "--out", painted, "--refine", 2, *some)
+        made(film, "render", painted, "--out", film, *FILM)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
