@@ -1,77 +1,137 @@
 import json
+import re
 from collections.abc import Callable
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
-from vnca.automaton.model import Model
+from vnca.automaton.model import MODEL_NAME
 
 Vnca = Callable[..., Any]
-SMALL = ("--size", "32")
+SMALL = ("--size", "64", "--warmup", "4", "--steps-per-frame", "2")
+NAMES = {
+    "style.gap_closed", "views.spread", "views.reprojection", "time.warp_short", "time.warp_long",
+    "time.flow", "motion.direction", "motion.magnitude", "motion.transport",
+    "density.mass_change", "density.moved", "density.appeared",
+}  # fmt: skip
 
 
-def test_a_run_is_measured_by_both_estimators(
-    vnca: Vnca, model: Path, frame: Path, tmp_path: Path
+@pytest.fixture(autouse=True)
+def small_pictures_of_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vnca.evaluation.survey.MOTION_SIZE", 40)
+
+
+class Page(HTMLParser):
+    """What a page wants from elsewhere, and whether what it opens is closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.open: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.links += [value or "" for name, value in attrs if name in ("src", "href")]
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        pass
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_a_report_has_every_measure_and_needs_nothing_else(
+    vnca: Vnca, model: Path, smoke: Path, style: Path, tmp_path: Path
 ) -> None:
-    report = tmp_path / "measures.json"
-    outcome = vnca("evaluate", model, frame, "--json", report, *SMALL)
+    out = tmp_path / "report"
+    outcome = vnca("evaluate", model, smoke, "--style", style, "--out", out, *SMALL)
     assert outcome.code == 0, outcome.err
-    assert "transport" in outcome.out
-    measures = json.loads(report.read_text())
-    for name in ("motion.direction", "motion.magnitude"):
-        assert set(measures[name]) == {"network", "dis", "unit"}
-        assert measures[name]["dis"] >= 0
-    assert measures["motion.direction"]["network"] <= 2
-    assert measures["motion.transport"]["value"] > 0
-    assert f"{measures['motion.transport']['value']:.3f}" in outcome.out
+    measures = json.loads((out / "report.json").read_text())
+    assert set(measures) == NAMES
+    for name, measure in measures.items():
+        assert name in outcome.out
+        assert measure["unit"]
+        if measure["value"] is None:
+            assert name == "time.warp_long"
+            assert measure["reason"] == "it takes 8 frames in a row"
+    assert measures["time.warp_short"]["ratio"] > 0
+    assert measures["density.appeared"]["value"] == 0
+    assert set(measures["density.moved"]["frames"]) == {"1", "2", "3"}
+    assert len(measures["views.spread"]["views"]) == 32
+    assert {"network", "dis", "unit"} <= set(measures["motion.direction"])
+
+    text = (out / "report.html").read_text()
+    page = Page(text)
+    assert not page.open
+    assert len(page.links) >= 20
+    assert all(link.startswith("data:image/webp;base64,") for link in page.links)
+    assert "script" not in text
+    assert "url(" not in text
+    plots = re.findall(r"<svg.*?</svg>", text)
+    assert len(plots) >= 3
+    for plot in plots:
+        ElementTree.fromstring(plot)
 
 
-def test_the_velocity_ablation_trains_and_compares_three_kinds(
+def test_what_a_run_was_trained_on_is_what_it_is_measured_on(
     vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
 ) -> None:
-    arguments = (
-        *("evaluate", frame, style, "--ablation", "velocity", "--out", tmp_path / "runs"),
-        *("--seeds", "0", "1", "--json", tmp_path / "ablation.json", *SMALL, *tiny),
-        *("--motion.weight", "0.5"),
-    )
-    outcome = vnca(*arguments)
+    run = tmp_path / "trained"
+    assert vnca("train", frame, style, "--out", run, *tiny, "--view.gamma", "3").code == 0
+    outcome = vnca("evaluate", run, "--velocity-grid", "none", *SMALL)
     assert outcome.code == 0, outcome.err
-    measures = json.loads((tmp_path / "ablation.json").read_text())
-    assert list(measures) == ["no motion loss", "no velocity encoding", "both"]
-    assert all(len(runs) == 2 for runs in measures.values())
-    for name in measures:
-        assert name in outcome.out
-    trained = {path.name: Model.load(path) for path in (tmp_path / "runs").iterdir()}
-    assert len(trained) == 6
-    assert not trained["no_velocity_encoding-1"].rule.config.velocity_prior
-    assert trained["both-1"].rule.config.velocity_prior
+    measures = json.loads((run / "evaluation" / "report.json").read_text())
+    assert list(measures["style.gap_closed"]["frames"]) == ["2"]
+    assert measures["time.warp_short"]["reason"] == "it takes 2 frames in a row"
+    assert "Not measured" in (run / "evaluation" / "report.html").read_text()
+    frame.unlink()
+    assert str(frame) in vnca("evaluate", run, *SMALL).complaint
 
-    before = (tmp_path / "runs" / "both-0" / "model.safetensors").stat().st_mtime_ns
-    again = vnca(*arguments)
-    assert again.out == outcome.out
-    assert (tmp_path / "runs" / "both-0" / "model.safetensors").stat().st_mtime_ns == before
+
+def test_smoke_without_velocity_is_measured_as_far_as_it_goes(
+    vnca: Vnca, model: Path, smoke: Path, style: Path, tmp_path: Path
+) -> None:
+    options = ("--velocity-grid", "none", "--out", tmp_path, "--style", style, *SMALL)
+    assert vnca("evaluate", model, smoke, *options).code == 0
+    measures = json.loads((tmp_path / "report.json").read_text())
+    unknown = {name for name, measure in measures.items() if measure["value"] is None}
+    assert unknown == {
+        *("time.warp_short", "time.warp_long"),
+        *("motion.direction", "motion.magnitude", "motion.transport"),
+    }
+    assert "no velocity" in measures["motion.direction"]["reason"]
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (("--size", "8"), "--size 8"),
-        (("--json", "/proc/none/file.json"), "cannot be written"),
+        (("--style-scale", "0.1"), "--style-scale 0.1"),
+        (("--frames", "70-80"), "70-80"),
     ],
 )
 def test_what_cannot_be_measured_is_told_in_one_line(
-    vnca: Vnca, model: Path, frame: Path, options: tuple[str, ...], message: str
+    vnca: Vnca, model: Path, smoke: Path, style: Path, options: tuple[str, ...], message: str
 ) -> None:
-    assert message in vnca("evaluate", model, frame, *options).complaint
+    assert message in vnca("evaluate", model, smoke, "--style", style, *options).complaint
 
 
-def test_an_ablation_of_motion_needs_a_motion_loss(
-    vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
+def test_what_is_not_where_it_should_be_is_told_before_long_work(
+    vnca: Vnca, model: Path, smoke: Path, style: Path
 ) -> None:
-    outcome = vnca(
-        *("evaluate", frame, style, "--ablation", "velocity", "--out", tmp_path, *tiny),
-        *("--motion.weight", "0"),
-    )
-    assert "--motion.weight" in outcome.complaint
-    assert not list(tmp_path.glob("*/model.safetensors"))
+    assert "'night.png' is; name it with --style" in vnca("evaluate", model, smoke).complaint
+    assert "no such file" in vnca("evaluate", model, smoke, "--style", "none.png").complaint
+    out = ("--style", style, "--out", style / "report")
+    assert "is not a folder" in vnca("evaluate", model, smoke, *out).complaint
+
+
+def test_a_run_that_tells_no_frame_asks_for_a_sequence(
+    vnca: Vnca, model: Path, style: Path
+) -> None:
+    complaint = vnca("evaluate", model / MODEL_NAME, "--style", style).complaint
+    assert "name a sequence" in complaint

@@ -1,245 +1,177 @@
-"""`vnca evaluate RUN FRAME`, and `vnca evaluate FRAME STYLE --ablation velocity --out DIR`."""
+"""`vnca evaluate RUN [SEQUENCE]`, and `vnca evaluate FRAME STYLE --ablation velocity --out DIR`."""
 
 import dataclasses
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 import tyro
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule
-from vnca.cli.options import chosen, is_given, parse, say
-from vnca.cli.sequence import beside
-from vnca.cli.train import Train, train
+import vnca
+from vnca.automaton.model import Model
+from vnca.automaton.stepper import stepper
+from vnca.bench.machine import run_facts
+from vnca.cli.options import is_given, parse, say
+from vnca.cli.progress import tracked
+from vnca.cli.recorded import recorded_smoke
+from vnca.cli.sequence import open_sequence, sequence_box, volumes
 from vnca.errors import OptionError
-from vnca.evaluation.estimators import Estimator, dis, ours
-from vnca.evaluation.motion import (
-    MotionMeasures,
-    measure_carried_noise,
-    measure_drift,
-    measure_motion,
-)
-from vnca.files import existing_file, whole_file, writable_file
-from vnca.io.smoke import SmokeFormat, read_smoke
-from vnca.training.config import PRESETS, TrainConfig
-from vnca.volume import Volume
+from vnca.evaluation.measures import Measure, measures
+from vnca.evaluation.report import report
+from vnca.evaluation.stage import Stage
+from vnca.evaluation.style import StyleGauge
+from vnca.evaluation.survey import survey
+from vnca.files import whole_file, writable_folder
+from vnca.io.image import read_image
+from vnca.io.sequence import format_frames
+from vnca.io.smoke import SmokeFormat, with_fitted_scale
+from vnca.io.smoke_format import NO_VELOCITY
+from vnca.stylize.config import StylizeConfig
+from vnca.stylize.roll import stylize
+from vnca.training.run import CONFIG_NAME
+from vnca.typing import FloatArray
+
+REPORT_NAME = "report.html"
+MEASURES_NAME = "report.json"
 
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measure how the texture of a trained rule moves."""
+    """Measure how well a trained rule paints a sequence, and write a report with pictures."""
 
     run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RUN")]
     """A model file, or the folder of a training run."""
-    frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
-    """A frame of smoke with velocity."""
-    json: Path | None = None
-    """File for the measures, an object each."""
-    size: int = 128
+    sequence: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="SEQUENCE")] = None
+    """A folder, a pattern or a file; the frame of the training unless given."""
+    out: Path | None = None
+    """Folder for report.html and report.json; "evaluation" in that of the run unless given."""
+    frames: str | None = None
+    """Frames to paint, such as 30-53 or 1,4,7-9; all unless given."""
+    style: Path | None = None
+    """The picture; that of the training unless given."""
+    style_scale: float = 1.0
+    """Shorter side of the picture relative to the views: as in training, where the smoke fills as
+    many cells; half of it where it fills twice as many."""
+    size: int = 192
     """Rows and columns of the views, pixels."""
+    backend: Literal["auto", "native", "reference"] = "auto"
+    """What computes the automaton."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
+    config: Annotated[StylizeConfig, tyro.conf.arg(name="")] = field(default_factory=StylizeConfig)
+    """How the rule is applied."""
 
     def __post_init__(self) -> None:
-        _check_size(self.size)
-
-
-@dataclass(frozen=True)
-class Ablation:
-    """Train with and without a part of the method, and measure what it does."""
-
-    frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
-    """A frame of smoke with velocity."""
-    style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
-    """The picture: PNG, JPEG or WebP."""
-    ablation: Literal["velocity"]
-    """What is taken away."""
-    out: Path
-    """Folder for a run of each kind; runs that are there already are not trained again."""
-    seeds: tuple[int, ...] = (0, 1, 2)
-    """A run of each kind for each seed."""
-    preset: Literal["draft", "standard", "paper"] = "draft"
-    """Values of all options below that are not given."""
-    json: Path | None = None
-    """File for the measures of all runs."""
-    size: int = 128
-    """Rows and columns of the views that are measured, pixels."""
-    device: str = "auto"
-    """Where to train: auto, cpu or cuda."""
-    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
-    """How smoke is read from files."""
-    config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=TrainConfig)
-    """Hyperparameters."""
-
-    def __post_init__(self) -> None:
-        _check_size(self.size)
-        if not self.config.motion.weight:
-            raise OptionError(f"--motion.weight {self.config.motion.weight}: must be positive here")
-
-
-def _check_size(size: int) -> None:
-    if size < 32:
-        raise OptionError(f"--size {size}: at least 32 pixels are needed")
+        if self.size < 64:
+            raise OptionError(f"--size {self.size}: at least 64 pixels are needed")
+        if not 64 <= self.size * self.style_scale <= 4096:
+            raise OptionError(
+                f"--style-scale {self.style_scale:g}: makes the picture "
+                f"{self.size * self.style_scale:.0f} pixels wide, of 64 to 4096"
+            )
 
 
 def run(arguments: Sequence[str]) -> None:
-    """Read the options and measure."""
+    """Read the options and measure; smoke is read as it was for training unless told otherwise."""
     if is_given(arguments, "--ablation"):
+        from vnca.cli import evaluate_ablation
+
+        evaluate_ablation.run(arguments)
+        return
+    options = parse("evaluate", Evaluate, arguments)
+    model = Model.load(options.run)
+    smoke = recorded_smoke(options.run, model)
+    if smoke is not None:
         missing: Any = tyro.MISSING
-        preset = chosen(arguments, "--preset", "draft")
-        defaults = Ablation(
-            missing, missing, missing, missing, config=PRESETS.get(preset, TrainConfig())
-        )
-        ablate(parse("evaluate", Ablation, arguments, default=defaults))
-    else:
-        evaluate(parse("evaluate", Evaluate, arguments))
+        options = parse("evaluate", Evaluate, arguments, default=Evaluate(missing, smoke=smoke))
+    evaluate(options, model)
 
 
-def evaluate(options: Evaluate) -> None:
-    """Measure a run and print what was found.
-
-    Raises:
-        VncaError: If an input cannot be used or the file cannot be written.
-    """
-    rule = Model.load(options.run).rule
-    if options.json:
-        writable_file(options.json)
-    smoke = _read(options.frame, options.smoke)
-    seen_by = estimators()
-    measures = measure_motion(rule, smoke, seen_by, size=options.size)
-    print(f"the smoke moves by {measures.speed:.2f} pixels a frame where motion is measured")
-    print(_heading())
-    print(_row(str(options.run), [measures]))
-    _print_yardsticks(rule, smoke, seen_by, options.size)
-    if options.json:
-        _write(options.json, as_json(measures))
-
-
-VARIANTS = {
-    "no motion loss": (False, True),
-    "no velocity encoding": (True, False),
-    "both": (True, True),
-}
-"""Of the ablation: whether there is a motion loss, and whether cells are told the velocity."""
-
-
-def ablate(options: Ablation) -> None:
-    """Train the variants and print how their textures move, mean and spread over the seeds.
+def evaluate(options: Evaluate, model: Model) -> None:
+    """Paint, measure, write the report and print what was found.
 
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
-    if options.json:
-        writable_file(options.json)
-    seen_by = estimators()
-    smoke = _read(options.frame, options.smoke)
-    rules: list[Rule] = []
-    found: dict[str, list[MotionMeasures]] = {}
-    for variant, config in _configurations(options):
-        folder = options.out / f"{variant.replace(' ', '_')}-{config.seed}"
-        if not _is_trained(folder, config):
-            say(f"{variant}, seed {config.seed}: {folder}")
-            train(
-                Train(
-                    options.frame,
-                    options.style,
-                    out=folder,
-                    preset=options.preset,
-                    texture=0,  # as the paper trains
-                    overwrite=True,
-                    device=options.device,
-                    smoke=options.smoke,
-                    config=config,
-                )
-            )
-        rules.append(Model.load(folder).rule)
-        measures = measure_motion(rules[-1], smoke, seen_by, size=options.size)
-        found.setdefault(variant, []).append(measures)
-    print(_heading())
-    for variant, runs in found.items():
-        print(_row(variant, runs))
-    _print_yardsticks(rules[-1], smoke, seen_by, options.size)
-    if options.json:
-        _write(options.json, {name: [*map(as_json, runs)] for name, runs in found.items()})
-
-
-def _configurations(options: Ablation) -> Iterator[tuple[str, TrainConfig]]:
-    for variant, (motion, velocity) in VARIANTS.items():
-        config = options.config
-        if not motion:
-            config = dataclasses.replace(
-                config, motion=dataclasses.replace(config.motion, weight=0.0)
-            )
-        rule = dataclasses.replace(config.rule, velocity_prior=velocity)
-        for seed in options.seeds:
-            yield variant, dataclasses.replace(config, rule=rule, seed=seed)
-
-
-def _is_trained(folder: Path, config: TrainConfig) -> bool:
-    """Whether the folder holds a finished run of this configuration."""
-    if not (folder / MODEL_NAME).exists():
-        return False
-    trained = Model.load(folder)
-    return (
-        trained.training.get("iterations") == config.iterations
-        and trained.rule.config == config.rule
-    )
-
-
-def estimators() -> Mapping[str, Estimator]:
-    """What sees motion: the network that training uses, and one it never meets."""
-    return {"network": ours(), "dis": dis()}
-
-
-def as_json(measures: MotionMeasures) -> dict[str, Any]:
-    """An object for each measure."""
-    return {
-        "motion.direction": {**measures.direction, "unit": "cosine distance"},
-        "motion.magnitude": {**measures.magnitude, "unit": "pixels per frame"},
-        "motion.transport": {"value": measures.transport, "unit": "share of the change"},
-        "motion.speed": {"value": measures.speed, "unit": "pixels per frame"},
+    folder = options.run if options.run.is_dir() else options.run.parent
+    out = writable_folder(options.out or folder / "evaluation")
+    picture = _picture(options, model, folder)
+    gauge = StyleGauge(picture, round(options.size * options.style_scale))
+    sequence = open_sequence(_sequence(options, folder), options.frames)
+    smoke = with_fitted_scale(options.smoke, sequence)
+    box = sequence_box(sequence, smoke)
+    # Once for where the smoke is, and once to paint: there may be too many frames to keep.
+    shapes = volumes(sequence, dataclasses.replace(smoke, velocity_grid=NO_VELOCITY))
+    stage = Stage.around(shapes, model.rule, options.size)
+    step = stepper(model.rule, options.backend)
+    paintings = stylize(volumes(sequence, smoke), model.rule, step, options.config, box=box)
+    tracking = tracked(paintings, "painting and measuring", len(sequence), "frames")
+    found = survey(tracking, len(sequence), model.rule, stage, gauge)
+    facts = {
+        "title": f"{folder.resolve().name} on {sequence[0].path.resolve().parent.name}",
+        "picture": str(model.training.get("style", options.style)),
+        "frames": f"{format_frames(found.frames)} of {sequence[0].path.name} …",
+        "training": ", ".join(
+            f"{name} {model.training[name]}"
+            for name in ("preset", "iterations", "seed", "features")
+            if name in model.training
+        ),
+        "measured": f"by vnca {vnca.__version__}, {run_facts('cpu', 1)['date']} UTC, "
+        f"at {options.size}×{options.size} pixels",
     }
+    with whole_file(out / REPORT_NAME) as temporary:
+        temporary.write_text(report(found, picture, facts), encoding="utf-8")
+    listed = measures(found)
+    with whole_file(out / MEASURES_NAME) as temporary:
+        described = {measure.name: measure.as_json() for measure in listed}
+        temporary.write_text(json.dumps(described, indent=2) + "\n")
+    _print(listed)
+    say(f"report: {out / REPORT_NAME}")
 
 
-def _print_yardsticks(
-    rule: Rule, smoke: Volume, seen_by: Mapping[str, Estimator], size: int
-) -> None:
-    """What the measures say of a texture that follows the smoke, and of one that only drifts."""
-    drift = "".join(f"{value:>12.3f}" for value in measure_drift(rule, smoke, size=size))
-    print(f"{'drifting as one':22}{drift}{drift}{'-':>12}")
-    print(_row("carried noise", [measure_carried_noise(rule, smoke, seen_by, size=size)]))
+def _print(listed: Sequence[Measure]) -> None:
+    print(f"{'':22}{'painted':>10}{'unstylized':>12}  better")
+    for measure in listed:
+        value, plain = (
+            "-" if number is None else f"{number:.3f}"
+            for number in (measure.value, measure.unstylized)
+        )
+        print(f"{measure.name:22}{value:>10}{plain:>12}  {measure.better or '-'}")
 
 
-def _heading() -> str:
-    return (
-        f"{'':22}{'network':^24}{'dis':^24}\n"
-        f"{'':22}{'L_dir':>12}{'L_mag':>12}{'L_dir':>12}{'L_mag':>12}{'transport':>12}"
-    )
+def _picture(options: Evaluate, model: Model, folder: Path) -> FloatArray:
+    """The style picture: the one named, that of the training, or ours of the same name."""
+    path = options.style or _input(folder, "style")
+    if path is not None:
+        return read_image(path)
+    name = str(model.training.get("style"))
+    ours = files("vnca.data").joinpath(Path(name).name)
+    if not ours.is_file():
+        raise OptionError(
+            f"{options.run}: does not tell where its picture '{name}' is; name it with --style"
+        )
+    with as_file(ours) as path:
+        return read_image(path)
 
 
-def _row(name: str, runs: Sequence[MotionMeasures]) -> str:
-    columns = [
-        [getattr(measures, what)[estimator] for measures in runs]
-        for estimator in ("network", "dis")
-        for what in ("direction", "magnitude")
-    ]
-    columns.append([measures.transport for measures in runs])
-    return f"{name:22}" + "".join(f"{_spread(column):>12}" for column in columns)
+def _sequence(options: Evaluate, folder: Path) -> str:
+    """The sequence named, or the frame of the training."""
+    path = options.sequence or _input(folder, "frame")
+    if path is None:
+        raise OptionError(
+            f"{options.run}: does not tell where the smoke is that it was trained on; "
+            f"name a sequence: vnca evaluate {options.run} SEQUENCE"
+        )
+    return str(path)
 
 
-def _spread(values: Sequence[float]) -> str:
-    mean = f"{np.mean(values):.3f}"
-    return mean if len(values) == 1 else f"{mean}±{np.std(values):.2f}"
-
-
-def _read(frame: Path, smoke: SmokeFormat) -> Volume:
-    return read_smoke(existing_file(frame), beside(frame, smoke))
-
-
-def _write(path: Path, measures: dict[str, Any]) -> None:
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(measures, indent=2) + "\n")
+def _input(folder: Path, name: str) -> Path | None:
+    """Where a run says that an input of its training is."""
+    try:
+        path = json.loads((folder / CONFIG_NAME).read_text())["inputs"][name]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return Path(path) if isinstance(path, str) else None

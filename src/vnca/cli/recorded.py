@@ -7,6 +7,10 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from vnca.automaton.model import Model, from_record
+from vnca.errors import ModelError
+from vnca.io.smoke_format import SmokeFormat
+
 T = TypeVar("T")
 
 
@@ -51,3 +55,18 @@ def _restored(hint: Any, value: Any, name: str) -> Any:
     elif type(value) is hint or (hint is float and type(value) is int and abs(value) < 2**53):
         return value
     raise TypeError(f"{name}: {value!r} is not of its type")
+
+
+def recorded_smoke(path: Path, model: Model) -> SmokeFormat | None:
+    """How smoke was read for the training of a model, if its file, at `path`, tells.
+
+    Raises:
+        ModelError: If what it tells makes no sense.
+    """
+    smoke = model.training.get("smoke")
+    if not smoke:
+        return None
+    try:
+        return from_record(SmokeFormat, smoke)
+    except TypeError as error:
+        raise ModelError(f"{path}: damaged model metadata (smoke: {error})") from error

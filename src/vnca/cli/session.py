@@ -112,7 +112,8 @@ class Session:
         with self.folder:
             if checkpoint is None:
                 self._keep()
-            self.folder.start(trainer.config, self.training)
+            inputs = {name: self.asked[name] for name in ("frame", "style") if name in self.asked}
+            self.folder.start(trainer.config, {**self.training, "inputs": inputs})
             say(
                 f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
                 f"features '{self.training['features']}', {self.training['device']}"

@@ -13,15 +13,16 @@ from typing import Annotated, Any, Literal
 import tyro
 
 import vnca
-from vnca.automaton.model import Model, from_record
+from vnca.automaton.model import Model
 from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
 from vnca.cli.film import Film, FilmConfig
 from vnca.cli.options import parse, say
 from vnca.cli.progress import Progress
+from vnca.cli.recorded import recorded_smoke
 from vnca.cli.sequence import open_sequence, sequence_box
 from vnca.cli.termination import finishing
-from vnca.errors import BackendUnavailableError, ModelError, OptionError
+from vnca.errors import BackendUnavailableError, OptionError
 from vnca.files import remove_leftovers, writable_file, writable_folder
 from vnca.io.painted import read_colour
 from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
@@ -93,19 +94,12 @@ def run(arguments: Sequence[str]) -> None:
     """Read the options and paint; smoke is read as it was for training unless told otherwise."""
     options = parse("stylize", Stylize, arguments)
     model = Model.load(options.model)
-    recorded = model.training.get("smoke")
-    if recorded:
+    smoke = recorded_smoke(options.model, model)
+    if smoke is not None:
         missing: Any = tyro.MISSING
-        defaults = Stylize(missing, missing, missing, smoke=_recorded(options.model, recorded))
+        defaults = Stylize(missing, missing, missing, smoke=smoke)
         options = parse("stylize", Stylize, arguments, default=defaults)
     paint(options, model)
-
-
-def _recorded(model: Path, smoke: Any) -> SmokeFormat:
-    try:
-        return from_record(SmokeFormat, smoke)
-    except TypeError as error:
-        raise ModelError(f"{model}: damaged model metadata (smoke: {error})") from error
 
 
 def paint(options: Stylize, model: Model | None = None) -> None:

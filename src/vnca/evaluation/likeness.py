@@ -1,6 +1,6 @@
 """How much the views of painted smoke look like the style picture."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,29 +71,35 @@ class Likeness:
             for at, name in enumerate(StyleDistances._fields)
         }
 
-    @classmethod
-    def joined(cls, parts: Sequence["Likeness"]) -> "Likeness":
-        """That of the views of several frames, of which each has about as many."""
-        return cls(
-            tuple(sight for part in parts for sight in part.sights),
-            tuple(distances for part in parts for distances in part.painted),
-            mean_distances(part.plain for part in parts),
-            mean_distances(part.cutout for part in parts),
-        )
 
-
-def likeness(gauge: StyleGauge, pairs: Sequence[Pair], frame: int) -> Likeness:
-    """Compare views of a frame with the style picture, where the smoke is opaque.
+def joined_likeness(parts: Iterable[Likeness | None]) -> Likeness:
+    """That of the views of several frames, of which each has about as many.
 
     Raises:
-        GridError: If it is opaque nowhere.
+        GridError: If no frame has one.
+    """
+    known = [part for part in parts if part is not None]
+    if not known:
+        raise GridError(
+            "the smoke is opaque in no frame that was looked at, so that its style cannot be "
+            "measured; choose others with --frames"
+        )
+    return Likeness(
+        tuple(sight for part in known for sight in part.sights),
+        tuple(distances for part in known for distances in part.painted),
+        mean_distances(part.plain for part in known),
+        mean_distances(part.cutout for part in known),
+    )
+
+
+def likeness(gauge: StyleGauge, pairs: Sequence[Pair]) -> Likeness | None:
+    """Compare views of a frame with the style picture where the smoke is opaque.
+
+    None where it is opaque in none of them.
     """
     pairs = [pair for pair in pairs if pair.where.sum() >= FEWEST_PIXELS]
     if not pairs:
-        raise GridError(
-            f"frame {frame}: its smoke is opaque nowhere, so that its style cannot be measured; "
-            "choose other frames"
-        )
+        return None
     return Likeness(
         tuple(pair.sight for pair in pairs),
         tuple(gauge.distances(p.painted.over(gauge.background), p.where) for p in pairs),
@@ -130,7 +136,7 @@ def measure_style(
         backend: What computes the automaton.
 
     Raises:
-        GridError: If there is no smoke, or a frame's smoke is opaque nowhere.
+        GridError: If there is no smoke, or none that is opaque.
     """
     box = Box((0, 0, 0), (0, 0, 0))
     for smoke in frames:
@@ -143,5 +149,5 @@ def measure_style(
         if (len(frames) - at) % every == 0:
             smoke = Coloured.painted(painting), Coloured.plain(painting.smoke)
             pairs = [stage.look_twice(*smoke, sight) for sight in SIDES]
-            parts.append(likeness(gauge, pairs, painting.smoke.frame))
-    return Likeness.joined(parts)
+            parts.append(likeness(gauge, pairs))
+    return joined_likeness(parts)

@@ -59,8 +59,8 @@ class Coloured(NamedTuple):
         """
         slopes = np.zeros((*smoke.density.shape, 3), np.float32)
         if min(smoke.density.shape) > 1:
-            gradient = np.gradient(gaussian_filter(smoke.density, 1.0), axis=(0, 1, 2))
-            slopes = np.stack(gradient, axis=-1)
+            smooth = gaussian_filter(smoke.density, 1.0)
+            slopes = np.stack([np.gradient(smooth, axis=axis) for axis in range(3)], axis=-1)
         steepness = np.linalg.norm(slopes, axis=-1, keepdims=True)
         facing = -(slopes / np.maximum(steepness, 1e-6)) @ _LIGHT
         shade = _GREY * (1 + facing / 2)

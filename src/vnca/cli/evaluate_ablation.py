@@ -1,0 +1,199 @@
+"""`vnca evaluate FRAME STYLE --ablation velocity --out DIR`."""
+
+import dataclasses
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import tyro
+
+from vnca.automaton.model import MODEL_NAME, Model
+from vnca.automaton.rule import Rule
+from vnca.cli.options import chosen, parse, say
+from vnca.cli.sequence import beside
+from vnca.cli.train import Train, train
+from vnca.errors import OptionError
+from vnca.evaluation.estimators import Estimator, dis, ours
+from vnca.evaluation.motion import (
+    MotionMeasures,
+    measure_carried_noise,
+    measure_drift,
+    measure_motion,
+)
+from vnca.files import existing_file, whole_file, writable_file
+from vnca.io.smoke import SmokeFormat, read_smoke
+from vnca.training.config import PRESETS, TrainConfig
+from vnca.volume import Volume
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """Train with and without a part of the method, and measure what it does."""
+
+    frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
+    """A frame of smoke with velocity."""
+    style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
+    """The picture: PNG, JPEG or WebP."""
+    ablation: Literal["velocity"]
+    """What is taken away."""
+    out: Path
+    """Folder for a run of each kind; runs that are there already are not trained again."""
+    seeds: tuple[int, ...] = (0, 1, 2)
+    """A run of each kind for each seed."""
+    preset: Literal["draft", "standard", "paper"] = "draft"
+    """Values of all options below that are not given."""
+    json: Path | None = None
+    """File for the measures of all runs."""
+    size: int = 128
+    """Rows and columns of the views that are measured, pixels."""
+    device: str = "auto"
+    """Where to train: auto, cpu or cuda."""
+    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
+    """How smoke is read from files."""
+    config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=TrainConfig)
+    """Hyperparameters."""
+
+    def __post_init__(self) -> None:
+        if self.size < 32:
+            raise OptionError(f"--size {self.size}: at least 32 pixels are needed")
+        if not self.config.motion.weight:
+            raise OptionError(f"--motion.weight {self.config.motion.weight}: must be positive here")
+
+
+def run(arguments: Sequence[str]) -> None:
+    """Read the options, train and measure."""
+    missing: Any = tyro.MISSING
+    preset = chosen(arguments, "--preset", "draft")
+    defaults = Ablation(
+        missing, missing, missing, missing, config=PRESETS.get(preset, TrainConfig())
+    )
+    ablate(parse("evaluate", Ablation, arguments, default=defaults))
+
+
+VARIANTS = {
+    "no motion loss": (False, True),
+    "no velocity encoding": (True, False),
+    "both": (True, True),
+}
+"""Of the ablation: whether there is a motion loss, and whether cells are told the velocity."""
+
+
+def ablate(options: Ablation) -> None:
+    """Train the variants and print how their textures move, mean and spread over the seeds.
+
+    Raises:
+        VncaError: If an input cannot be used or the output cannot be written.
+    """
+    if options.json:
+        writable_file(options.json)
+    seen_by = estimators()
+    smoke = _read(options.frame, options.smoke)
+    rules: list[Rule] = []
+    found: dict[str, list[MotionMeasures]] = {}
+    for variant, config in _configurations(options):
+        folder = options.out / f"{variant.replace(' ', '_')}-{config.seed}"
+        if not _is_trained(folder, config):
+            say(f"{variant}, seed {config.seed}: {folder}")
+            train(
+                Train(
+                    options.frame,
+                    options.style,
+                    out=folder,
+                    preset=options.preset,
+                    texture=0,  # as the paper trains
+                    overwrite=True,
+                    device=options.device,
+                    smoke=options.smoke,
+                    config=config,
+                )
+            )
+        rules.append(Model.load(folder).rule)
+        measures = measure_motion(rules[-1], smoke, seen_by, size=options.size)
+        found.setdefault(variant, []).append(measures)
+    print(_heading())
+    for variant, runs in found.items():
+        print(_row(variant, runs))
+    _print_yardsticks(rules[-1], smoke, seen_by, options.size)
+    if options.json:
+        _write(options.json, {name: [*map(as_json, runs)] for name, runs in found.items()})
+
+
+def _configurations(options: Ablation) -> Iterator[tuple[str, TrainConfig]]:
+    for variant, (motion, velocity) in VARIANTS.items():
+        config = options.config
+        if not motion:
+            config = dataclasses.replace(
+                config, motion=dataclasses.replace(config.motion, weight=0.0)
+            )
+        rule = dataclasses.replace(config.rule, velocity_prior=velocity)
+        for seed in options.seeds:
+            yield variant, dataclasses.replace(config, rule=rule, seed=seed)
+
+
+def _is_trained(folder: Path, config: TrainConfig) -> bool:
+    """Whether the folder holds a finished run of this configuration."""
+    if not (folder / MODEL_NAME).exists():
+        return False
+    trained = Model.load(folder)
+    return (
+        trained.training.get("iterations") == config.iterations
+        and trained.rule.config == config.rule
+    )
+
+
+def estimators() -> Mapping[str, Estimator]:
+    """What sees motion: the network that training uses, and one it never meets."""
+    return {"network": ours(), "dis": dis()}
+
+
+def as_json(measures: MotionMeasures) -> dict[str, Any]:
+    """An object for each measure."""
+    return {
+        "motion.direction": {**measures.direction, "unit": "cosine distance"},
+        "motion.magnitude": {**measures.magnitude, "unit": "pixels per frame"},
+        "motion.transport": {"value": measures.transport, "unit": "share of the change"},
+        "motion.speed": {"value": measures.speed, "unit": "pixels per frame"},
+    }
+
+
+def _print_yardsticks(
+    rule: Rule, smoke: Volume, seen_by: Mapping[str, Estimator], size: int
+) -> None:
+    """What the measures say of a texture that follows the smoke, and of one that only drifts."""
+    drift = "".join(f"{value:>12.3f}" for value in measure_drift(rule, smoke, size=size))
+    print(f"{'drifting as one':22}{drift}{drift}{'-':>12}")
+    print(_row("carried noise", [measure_carried_noise(rule, smoke, seen_by, size=size)]))
+
+
+def _heading() -> str:
+    return (
+        f"{'':22}{'network':^24}{'dis':^24}\n"
+        f"{'':22}{'L_dir':>12}{'L_mag':>12}{'L_dir':>12}{'L_mag':>12}{'transport':>12}"
+    )
+
+
+def _row(name: str, runs: Sequence[MotionMeasures]) -> str:
+    columns = [
+        [getattr(measures, what)[estimator] for measures in runs]
+        for estimator in ("network", "dis")
+        for what in ("direction", "magnitude")
+    ]
+    columns.append([measures.transport for measures in runs])
+    return f"{name:22}" + "".join(f"{_spread(column):>12}" for column in columns)
+
+
+def _spread(values: Sequence[float]) -> str:
+    mean = f"{np.mean(values):.3f}"
+    return mean if len(values) == 1 else f"{mean}±{np.std(values):.2f}"
+
+
+def _read(frame: Path, smoke: SmokeFormat) -> Volume:
+    return read_smoke(existing_file(frame), beside(frame, smoke))
+
+
+def _write(path: Path, measures: dict[str, Any]) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(measures, indent=2) + "\n")
