@@ -39,6 +39,24 @@ def test_cells_are_told_position_density_and_velocity() -> None:
     np.testing.assert_allclose(values[..., 4:], volume.velocity / 2)
 
 
+def test_a_rule_is_told_the_same_on_a_finer_grid_in_steps_that_last_less() -> None:
+    coarse = rule(position_prior=False)
+    volume = smoke()
+    volume = dataclasses.replace(
+        volume, density=np.full_like(volume.density, 0.3), velocity=np.full((*SHAPE, 3), 1.5)
+    )
+    told = []
+    for factor in (1, 3):
+        fine = volume.refined(factor)
+        domain = Domain.from_mask(fine.density > 0, fine.origin)
+        told.append(priors(domain, fine, coarse.refined(factor))[0])
+    np.testing.assert_allclose(told[1], told[0], rtol=1e-6)
+    config, scales = coarse.refined(3).config, coarse.refined(3).scales
+    assert config.steps_per_frame == 3 * coarse.config.steps_per_frame
+    # Three cells absorb what one did.
+    assert 3 * scales.gamma == coarse.scales.gamma
+
+
 def test_cells_outside_the_smoke_are_told_that_there_is_none() -> None:
     volume = smoke()
     domain = Domain.from_mask(np.ones((1, 1, 1), bool), (100, 0, 0))

@@ -13,9 +13,11 @@ from vnca.automaton.model import Model
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.cli import main
 from vnca.cli.stylize import Stylize
+from vnca.errors import OptionError
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
 from vnca.kernels.update import native
+from vnca.stylize.roll import Roll, RollState
 from vnca.typing import AnyArray
 from vnca.volume import Volume
 
@@ -202,6 +204,47 @@ def test_a_rule_sees_the_same_smoke_whatever_axis_is_up(
     assert colour[active].std() > 1e-3
 
 
+def test_a_finer_painting_has_finer_smoke_and_all_else_as_it_was(
+    painted: Paint, vnca: Vnca, smoke: Path, tmp_path: Path
+) -> None:
+    size = ("--film.rows", 32, "--film.columns", 32)
+    out = painted("--refine", 2, "--preview", tmp_path / "film.gif", *size)
+    before, after = (grids(folder / "ball_0002.vdb") for folder in (smoke, out))
+    assert list(after) == [*before, "Cd"]
+    for name in ("velocity", "temperature"):
+        for ours, theirs in zip(dense(after[name]), dense(before[name]), strict=True):
+            assert ours.tobytes() == theirs.tobytes()
+        assert after[name].transform == before[name].transform
+    for name in ("density", "Cd"):
+        np.testing.assert_allclose(after[name].transform.voxel_size, 0.05)
+    source = read_smoke(smoke / "ball_0002.vdb", SmokeFormat()).refined(2)
+    inside = after["density"].active_box().slices(source.box)
+    ratio = dense(after["density"])[0] / np.maximum(source.density[inside], 1e-9)
+    active = source.density[inside] > 0
+    np.testing.assert_array_equal(dense(after["density"])[1], active)
+    assert 0.499 <= ratio[active].min() < 1 < ratio[active].max() <= 1.501
+    assert dense(after["Cd"])[0][active].std() > 1e-3
+    picture = tmp_path / "picture.png"
+    done = vnca("render", out, "--frames", 2, "--out", picture, *size)
+    assert done.code == 0, done.err
+    assert picture.exists()
+
+
+def test_a_finer_painting_takes_as_many_more_steps_unless_told_how_many(
+    vnca: Vnca, model: Path, smoke: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[int] = []
+    monkeypatch.setattr(Roll, "start", lambda self: seen.append(self.steps_per_frame) or fail())
+
+    def fail() -> RollState:
+        raise OptionError("enough")
+
+    for options in ((), ("--refine", 3), ("--refine", 3, "--steps-per-frame", 5)):
+        assert vnca("stylize", model, smoke, "--out", tmp_path / "out", *options).code == 2
+    steps = Model.load(model).rule.config.steps_per_frame
+    assert seen == [steps, 3 * steps, 5]
+
+
 def test_a_folder_in_mantaflows_layout(painted: Paint, tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     for number in (4, 5):
@@ -214,6 +257,8 @@ def test_a_folder_in_mantaflows_layout(painted: Paint, tmp_path: Path) -> None:
     after = grids(out / "005.vdb")
     assert set(after) == {"density", "Cd", "velocity"}
     assert dense(after["Cd"])[0].shape == (8, 7, 6, 3)
+    finer = grids(painted("--refine", 2, sequence=tmp_path / "npz") / "005.vdb")
+    assert dense(finer["Cd"])[0].shape == (16, 14, 12, 3)
 
 
 def test_a_preview_has_a_picture_a_frame(painted: Paint, tmp_path: Path) -> None:

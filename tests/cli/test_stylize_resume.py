@@ -99,6 +99,16 @@ def test_a_painting_goes_on_to_the_same_files(
     assert unfinished.files == unharmed
 
 
+def test_a_finer_painting_goes_on_to_the_same_files(painted: Painted, during: During) -> None:
+    assert painted.run("--refine", 2).code == 0
+    whole = painted.files
+    during(3, control_c)
+    assert painted.run("--refine", 2).code == 130
+    outcome = painted.run("--refine", 2, "--resume")
+    assert "going on after 2 frames" in outcome.err
+    assert painted.files == whole
+
+
 @pytest.mark.parametrize("name", ["film.gif", "film.mp4"])
 def test_a_film_is_the_same_whether_or_not_the_painting_was_interrupted(
     painted: Painted, during: During, tmp_path: Path, name: str
@@ -180,6 +190,7 @@ def without_a_painted_frame(painted: Painted) -> None:
     [
         (["--seed", 1], "--seed is another than when the painting was begun (0, now 1)"),
         (["--steps-per-frame", 5], "--steps-per-frame"),
+        (["--refine", 2], "--refine is another than when the painting was begun (1, now 2)"),
         (["--domain", "box"], '--domain is another than when the painting was begun ("active", '),
         (["--strength", 0.5], "--strength"),
         (["--density-scale", 0.5], "--density-scale"),

@@ -1,12 +1,13 @@
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from vnca.errors import OptionError, OutputError, ShapeError
-from vnca.io.painted import write_painted, write_smoke
+from vnca.io.painted import read_colour, write_painted, write_smoke
 from vnca.io.sequence import find_frames
 from vnca.io.smoke import read_smoke, with_fitted_scale
 from vnca.io.smoke_format import SmokeFormat
@@ -87,6 +88,33 @@ def test_a_painted_file_has_new_density_and_colour_and_all_the_rest(
         x, y, z = (start + step for start, step in zip(ORIGIN, cell, strict=True))
         ours = (z, x, y) if up == "y" else (x, y, z)
         np.testing.assert_allclose(values[cell], np.array(ours) / 64, rtol=1e-3)
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_finer_paint_lies_where_the_smoke_does_and_all_the_rest_stays(
+    source: Path, tmp_path: Path, up: Literal["z", "y"]
+) -> None:
+    form = SmokeFormat(up_axis=up)
+    fine = read_smoke(source, form).refined(2)
+    density, colour = painting(fine)
+    target = tmp_path / "painted.vdb"
+    write_painted(target, source, form, density=density, colour=colour, box=fine.box, refine=2)
+    painted = read_smoke(target, replace(form, velocity_grid="none"))
+    inside = painted.box.slices(fine.box)
+    np.testing.assert_allclose(painted.density, density[inside], rtol=1e-3)
+    np.testing.assert_allclose(painted.index_to_world, fine.index_to_world)
+    seen = read_colour(target, form, grid="Cd", box=fine.box)
+    assert seen is not None
+    shown = density > 0
+    np.testing.assert_allclose(seen[shown], colour[shown], rtol=1e-3)
+    assert not seen[~shown].any()
+    with open_vdb(source) as before, open_vdb(target) as after:
+        assert after.read("density").is_half
+        for name in ("heat", "velocity"):
+            assert after.grids[name].transform == before.grids[name].transform
+            np.testing.assert_array_equal(
+                after.read(name).tree.leaf_values, before.read(name).tree.leaf_values
+            )
 
 
 def test_colour_can_have_other_names_and_a_larger_box(source: Path, tmp_path: Path) -> None:
@@ -199,6 +227,22 @@ def test_mantaflow_frames_become_vdb_files_with_their_velocity(tmp_path: Path) -
         assert file.names == ("density", "Cd", "velocity")
         assert file.read("Cd").active_voxels == 63
         assert file.grids["velocity"].grid_class == "staggered"
+    fine = volume.refined(3)
+    write_painted(
+        target,
+        source,
+        PLAIN,
+        density=fine.density,
+        colour=painting(fine)[1],
+        box=fine.box,
+        refine=3,
+    )
+    finer = read_smoke(target, replace(y_up, velocity_grid="none"))
+    assert finer.box == fine.box
+    np.testing.assert_array_equal(finer.density, fine.density)
+    np.testing.assert_allclose(finer.index_to_world, fine.index_to_world)
+    with open_vdb(target) as file:
+        assert file.grids["velocity"].transform.voxel_size == (1, 1, 1)
 
 
 def test_a_simulated_volume_is_read_back_by_default_options(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from vnca.io.painted import read_colour
 from vnca.io.sequence import FrameSequence
 from vnca.io.sheet import contact_sheet
 from vnca.io.smoke import SmokeFormat
+from vnca.io.smoke_format import NO_VELOCITY
 from vnca.io.video import SUFFIXES as FILMS
 from vnca.render.brightness import gamma_for_cell_opacity
 from vnca.typing import Box, FloatArray
@@ -134,7 +135,9 @@ class _Shown:
 
 def _frames(sequence: FrameSequence, options: Render) -> Iterator[_Shown]:
     gamma = options.gamma
-    for frame, smoke in zip(sequence, volumes(sequence, options.smoke), strict=True):
+    # Nothing here needs velocity, and beside a refined painting it has coarser cells.
+    seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
+    for frame, smoke in zip(sequence, volumes(sequence, seen), strict=True):
         colour = read_colour(frame.path, options.smoke, grid=options.colour_grid, box=smoke.box)
         if gamma is None and smoke.density.size:
             opacity = CELL_OPACITY["unpainted" if colour is None else "painted"]

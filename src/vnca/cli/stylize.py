@@ -53,8 +53,11 @@ class Stylize:
     """Names under which the colour is written: Cd, `color` as Blender names it, or several."""
     preview: Path | None = None
     """Film of the painting: mp4, gif or webp."""
+    refine: Literal[1, 2, 3, 4] = 1
+    """Paint on a grid so many times as fine as that of the smoke."""
     gamma: float | None = None
-    """Extinction of density 1 in the preview, per cell: brightness without training again."""
+    """Extinction of density 1 in the preview, per cell of the smoke: brightness without training
+    again."""
     density_scale: float | None = None
     """Density that counts as 1; that of the training frame unless given."""
     backend: Literal["auto", "native", "reference"] = "auto"
@@ -129,7 +132,12 @@ def paint(options: Stylize, model: Model | None = None) -> None:
     smoke = with_fitted_scale(options.smoke, sequence)
     box = sequence_box(sequence, smoke, without_broken=options.on_error != "stop")
     backend = choose(options.backend)
-    roll = Roll(rule, stepper(rule, backend, precision=options.precision), options.config, box)
+    roll = Roll(
+        rule.refined(options.refine),
+        stepper(rule, backend, precision=options.precision),
+        options.config,
+        box.refined(options.refine),
+    )
     painter = Painter(
         sequence,
         options.out,
@@ -139,6 +147,7 @@ def paint(options: Stylize, model: Model | None = None) -> None:
         options.on_error,
         conditions={
             "the version of vnca": vnca.__version__,
+            "--refine": options.refine,
             "the model": _digest(rule),
             "the list of frames": [frame.path.name for frame in sequence],
             "the box of the smoke": box,
@@ -155,6 +164,7 @@ def paint(options: Stylize, model: Model | None = None) -> None:
             "--domain": roll.domain_kind,
         },
         tell=say,
+        refine=options.refine,
     )
     is_filmed = _paint(painter, options)
     say(f"painted: {options.out}")

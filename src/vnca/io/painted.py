@@ -13,8 +13,8 @@ from vnca.io.smoke_format import CELLS_PER_FRAME, UNITS_METADATA, SmokeFormat, u
 from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
-from vnca.typing import Box, FloatArray
-from vnca.volume import Volume
+from vnca.typing import BoolArray, Box, FloatArray
+from vnca.volume import Volume, refined_transform
 
 COLOUR_GRIDS = ("Cd",)
 _HALF_MOST = float(np.finfo(np.float16).max)
@@ -29,12 +29,15 @@ def write_painted(
     colour: FloatArray,
     box: Box,
     colour_grids: Sequence[str] = COLOUR_GRIDS,
+    refine: int = 1,
 ) -> None:
     """Write a frame of a sequence with new density and colour as a VDB file.
 
     Both get the transform, metadata, active cells and half-float saving of the source's density;
     every other grid of a VDB source is copied unchanged, except those the colours replace. The
     file has the source's axes: of an npz source, +y up, a voxel size of 1, and its velocity.
+    Refined, density and colour get the transform of the finer cells, and those with density are
+    active.
 
     Args:
         path: The VDB file to write.
@@ -44,6 +47,7 @@ def write_painted(
         colour: `[x, y, z, 3]` over `box`, linear RGB.
         box: Cells covered by the arrays, in our axes: at least those of the source's density.
         colour_grids: Names of the colour grids, several to have the colour several times.
+        refine: How many times as fine as the source's the painted cells are along each axis.
 
     Raises:
         OptionError: If a colour grid is named like the density, or two are named alike.
@@ -61,7 +65,7 @@ def write_painted(
         raise OptionError(f"colour_grids: expected names of their own, got {', '.join(names)}")
     _require_vdb(path)
     up = up_axis_of(source, format)
-    frame = _Painting(to_file(density, up), to_file(colour, up), box_to_file(box, up))
+    frame = _Painting(to_file(density, up), to_file(colour, up), box_to_file(box, up), refine)
     write = _paint_npz if source.suffix.lower() == ".npz" else _paint_vdb
     write(path, source, format, frame, colour_grids)
 
@@ -132,17 +136,29 @@ class _Painting(NamedTuple):
     density: FloatArray
     colour: FloatArray
     box: Box
+    refine: int
 
-    def over(self, cells: Box, source: Path) -> tuple[FloatArray, FloatArray]:
-        """Density and colour of `cells`.
+    def over(self, cells: Box, source: Path) -> "_Painting":
+        """The part of it that covers `cells` of the file.
 
         Raises:
             ShapeError: If some of them were not painted.
         """
+        cells = cells.refined(self.refine)
         if self.box.union(cells) != self.box:
             raise ShapeError(f"{source}: smoke in {cells}, but only {self.box} was painted")
         inside = cells.slices(self.box)
-        return self.density[inside], self.colour[inside]
+        return _Painting(self.density[inside], self.colour[inside], cells, self.refine)
+
+    def active(self, of_file: BoolArray) -> BoolArray:
+        """Which cells to store; `of_file` are active in the file."""
+        return of_file if self.refine == 1 else self.density != 0
+
+    def transform(self, of_file: Transform) -> Transform:
+        """That of the painted cells; `of_file` is that of the file's."""
+        if self.refine == 1:
+            return of_file
+        return Transform.from_matrix(refined_transform(of_file.index_to_world, self.refine))
 
 
 def _paint_vdb(
@@ -150,21 +166,26 @@ def _paint_vdb(
 ) -> None:
     with open_vdb(source) as file:
         header, old, cells = read_density(file, format)
-        _, active = old.to_dense(cells)
-        density, colour = frame.over(cells, source)
+        frame = frame.over(cells, source)
+        active = frame.active(old.to_dense(cells)[1])
+        transform, origin = frame.transform(old.transform), frame.box.lower
+        density, colour = frame.density, frame.colour
         dtype = VALUE_TYPES[old.value_type].dtype
         if dtype.kind != "f":
             dtype = np.dtype(np.float32)
         if old.is_half or dtype.itemsize == 2:
             density, colour = (np.clip(a, -_HALF_MOST, _HALF_MOST) for a in (density, colour))
-        new = Grid.from_dense(old.name, density.astype(dtype), active, cells.lower, like=old)
+        new = Grid.from_dense(
+            old.name, density.astype(dtype), active, origin, like=old, transform=transform
+        )
         grids: list[Grid | GridHeader] = [
             new if name == header.name else other
             for name, other in file.grids.items()
             if name == header.name or decoded(other.grid_name) not in colour_grids
         ]
         grids += [
-            Grid.from_dense(name, colour, active, cells.lower, like=old) for name in colour_grids
+            Grid.from_dense(name, colour, active, origin, like=old, transform=transform)
+            for name in colour_grids
         ]
         write_vdb(path, grids, metadata=file.metadata)
 
@@ -173,15 +194,22 @@ def _paint_npz(
     path: Path, source: Path, format: SmokeFormat, frame: _Painting, colour_grids: Sequence[str]
 ) -> None:
     stored = read_npz_smoke(source, format)
-    active, origin = stored.density != 0, stored.origin
-    x, y, z = (start + cells for start, cells in zip(origin, active.shape, strict=True))
-    density, colour = frame.over(Box(origin, (x, y, z)), source)
-    transform = Transform.from_matrix(stored.index_to_world)
+    origin, transform = stored.origin, Transform.from_matrix(stored.index_to_world)
+    x, y, z = (start + cells for start, cells in zip(origin, stored.density.shape, strict=True))
+    frame = frame.over(Box(origin, (x, y, z)), source)
+    active = frame.active(stored.density != 0)
     grids = [
-        Grid.from_dense(name, values, active, origin, transform=transform, grid_class="fog volume")
+        Grid.from_dense(
+            name,
+            values,
+            active,
+            frame.box.lower,
+            transform=frame.transform(transform),
+            grid_class="fog volume",
+        )
         for name, values in [
-            (format.density_grid, density),
-            *((name, colour) for name in colour_grids),
+            (format.density_grid, frame.density),
+            *((name, frame.colour) for name in colour_grids),
         ]
     ]
     if (velocity := stored.velocity) is not None:

@@ -25,7 +25,7 @@ _SAVING_SHARE = 0.02
 
 
 class _Read(NamedTuple):
-    """Smoke and where it is from."""
+    """Smoke, as fine as it is painted, and where it is from."""
 
     source: Source
     frame: Frame
@@ -49,6 +49,8 @@ class Painter:
         conditions: What else must be the same for a painting to be gone on with: its bytes
             follow from these, the sequence, the rule and nothing else.
         tell: Is given lines for the user.
+        refine: How many times as fine as the smoke's the grid of the painting is; what the roll
+            paints is refined smoke.
     """
 
     sequence: FrameSequence
@@ -59,6 +61,7 @@ class Painter:
     on_error: OnError
     conditions: Mapping[str, Any]
     tell: Callable[[str], None]
+    refine: int = 1
 
     @property
     def unfinished_path(self) -> Path:
@@ -158,6 +161,7 @@ class Painter:
             colour=painting.colour,
             box=read.smoke.box,
             colour_grids=self.colour_grids,
+            refine=self.refine,
         )
         return painting.state
 
@@ -166,7 +170,7 @@ class Painter:
         frame = self.sequence[at]
         try:
             status = existing_file(frame.path).stat()
-            smoke = read_smoke(frame.path, self.smoke, frame=frame.number)
+            smoke = read_smoke(frame.path, self.smoke, frame=frame.number).refined(self.refine)
         except BROKEN as error:
             return error
         except OSError as error:
