@@ -105,7 +105,7 @@ def _views(survey: Survey) -> Iterable[Measure]:
 
 def _time(survey: Survey) -> Iterable[Measure]:
     for name, title, later, frames, found in (
-        ("short", "Warp error, short", "the next frame", 1, [step.short for step in survey.steps]),
+        ("short", "Warp error, short", "the next", 1, [step.short for step in survey.steps]),
         (
             "long",
             "Warp error, long",
@@ -118,8 +118,8 @@ def _time(survey: Survey) -> Iterable[Measure]:
         yield _agreement(
             f"time.warp_{name}",
             title,
-            f"How far a picture and that of {later} disagree, each pixel followed along the "
-            "smoke's velocity.",
+            f"How far a picture and {later} disagree, each pixel followed along the smoke's "
+            "velocity.",
             error,
             _why_not(survey, frames),
             **({"unmoved": error.unmoved} if error else {}),

@@ -7,8 +7,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-WIDTH, HEIGHT = 640, 230
-_LEFT, _RIGHT, _TOP, _BOTTOM = 46, 150, 14, 38
+WIDTH, HEIGHT = 640, 220
+_LEFT, _RIGHT, _TOP, _BOTTOM = 46, 150, 26, 38
 _LABEL_GAP = 15  # between the middles of two labels, so that none covers another
 _INK, _RULE = "#6b6862", "#dedad2"
 _FONT = "system-ui, -apple-system, 'Segoe UI', 'Helvetica Neue', sans-serif"
@@ -79,7 +79,7 @@ def plot(lines: Sequence[Line], *, x: str, y: str, least: float | None = 0.0) ->
         if low <= place <= high
     ]
     parts.append(_text((_LEFT + right) / 2, HEIGHT - 4, x, "middle"))
-    parts.append(_text(_LEFT, _TOP - 4, y, "start"))
+    parts.append(_text(_LEFT, _TOP - 12, y, "start"))
     for line in lines:
         points = [
             None if value is None else (across(place), up(value))
