@@ -40,7 +40,11 @@ MEASURES_NAME = "report.json"
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measure how well a trained rule paints a sequence, and write a report with pictures."""
+    """Measure how well a trained rule paints a sequence, and write a report with pictures.
+
+    `vnca evaluate FRAME STYLE --ablation velocity --out DIR` trains with and without a part of
+    the method instead, and compares how their textures move.
+    """
 
     run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RUN")]
     """A model file, or the folder of a training run."""
