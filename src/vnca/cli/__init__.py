@@ -17,7 +17,7 @@ COMMANDS = {
     "train": "learn a rule from one frame of smoke and one picture",
     "stylize": "paint a smoke sequence with a trained rule",
     "texture": "grow solid textures and put them on meshes",
-    "evaluate": "measure how the texture of a trained rule moves",
+    "evaluate": "measure how well a rule paints a sequence, in a report",
     "render": "make a film or a turntable of a sequence",
     "bench": "time steps, training and painting on this machine",
     "info": "describe a volume file, a model or a training run",
