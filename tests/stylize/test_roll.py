@@ -150,8 +150,50 @@ def test_cells_live_as_far_from_the_smoke_as_the_rule_was_trained_with(reach: in
     rule = dataclasses.replace(RULE, config=config)
     smoke = Volume(np.pad(ball(0).density, 4), None, (0, 0, 0), np.eye(4), 0)
     (painting,) = stylize([smoke], rule, counting_step, StylizeConfig(), box=smoke.box)
-    lived = (painting.colour != 1).any(axis=-1)
+    lived = np.zeros(smoke.density.shape, bool)
+    lived[tuple(painting.state.cells.T)] = True
     np.testing.assert_array_equal(lived, dilate(smoke.density > 0.5, reach))
+
+
+def plain_step(
+    state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
+) -> FloatArray:
+    """A rule that paints all cells in one dark red."""
+    state = state.copy()
+    state[:-1, :3] = -0.1, -0.4, -0.5
+    return state
+
+
+def faint(fringe: int, **options: float) -> Painting:
+    """A ball of that red in a box of smoke too faint to be painted."""
+    density = np.maximum(np.pad(ball(0).density, 6), np.float32(1e-4))
+    smoke = Volume(density, None, (0, 0, 0), np.eye(4), 0)
+    config = StylizeConfig(warmup=1, **options)  # type: ignore[arg-type]
+    roll = Roll(RULE, plain_step, config, smoke.box, fringe=fringe)
+    return roll.paint(smoke, roll.start())
+
+
+def test_faint_smoke_has_the_colour_of_the_painting_beside_it_and_is_white_farther_away() -> None:
+    painting = faint(fringe=3)
+    red = srgb_to_linear(np.array([0.4, 0.1, 0.0]))
+    lived = np.zeros(painting.density.shape, bool)
+    lived[tuple(painting.state.cells.T)] = True
+    reached = lived
+    for _ in range(3):
+        reached = np.logical_or.reduce(
+            [np.roll(reached, step, axis) for axis in range(3) for step in (-1, 0, 1)]
+        )
+    assert lived.sum() < reached.sum() < reached.size
+    np.testing.assert_allclose(painting.colour[reached] - red, 0, atol=1e-6)
+    np.testing.assert_array_equal(painting.colour[~reached], 1)
+    # Only what lives changes the density.
+    np.testing.assert_array_equal(painting.density[~lived], painting.smoke.density[~lived])
+
+
+def test_a_fringe_fades_with_the_painting() -> None:
+    half, full = faint(fringe=2, strength=0.5), faint(fringe=2)
+    np.testing.assert_allclose(half.colour, 0.5 + 0.5 * full.colour, rtol=1e-6)
+    np.testing.assert_array_equal(faint(fringe=2, strength=0.0).colour, 1)
 
 
 def test_cells_of_the_whole_box_live_on_however_far_the_smoke_jumps() -> None:

@@ -18,13 +18,17 @@ from vnca.automaton.paint import colours, density_factors
 from vnca.automaton.priors import priors
 from vnca.automaton.rule import SMOKE_THRESHOLD, Rule
 from vnca.automaton.stepper import Step
+from vnca.io.velocity import extrapolated
 from vnca.kernels.update.mask import changing_rows
 from vnca.stylize.config import StylizeConfig
 from vnca.typing import Box, FloatArray, IntArray
 from vnca.volume import Volume
 
 UNPAINTED = 1.0
-"""Linear colour of smoke that the rule does not paint: white."""
+"""Linear colour of smoke far from all that the rule paints: white."""
+FRINGE = 3
+"""How many cells beyond the living ones their colour goes on, so that faint smoke is no pale seam
+where a renderer interpolates it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +60,8 @@ class Painting:
     Attributes:
         smoke: The frame as it was read.
         density: `[x, y, z]`, painted, in the units of the file.
-        colour: Linear RGB `[x, y, z, 3]`; white where the rule does not reach.
+        colour: Linear RGB `[x, y, z, 3]`; beside the living cells continued from them, white
+            farther away.
         state: What it leaves to the next frame.
     """
 
@@ -76,12 +81,14 @@ class Roll:
         config: How.
         box: Holds the smoke of all frames; gives cells their position. Known from the files'
             headers before the first frame is read.
+        fringe: How many cells beyond the living ones their colour goes on.
     """
 
     rule: Rule
     step: Step
     config: StylizeConfig
     box: Box
+    fringe: int = FRINGE
 
     @property
     def steps_per_frame(self) -> int:
@@ -124,7 +131,22 @@ class Roll:
                 probability=rule.config.update_probability,
             )
             values = self.step(values, rows, domain.neighbours, told)
-        return _shown(smoke, RollState(domain.cells, values, done), config)
+        return self._shown(smoke, RollState(domain.cells, values, done))
+
+    def _shown(self, smoke: Volume, state: RollState) -> Painting:
+        """The frame as a state shows it."""
+        colour, density = _unpainted(smoke), smoke.density.copy()
+        at = state.cells - np.asarray(smoke.origin, dtype=np.int32)
+        inside = ((at >= 0) & (at < smoke.density.shape)).all(axis=1)
+        where = tuple(at[inside].T)
+        cells = state.values[:-1][inside]
+        colour[where] += self.config.strength * (colours(cells) - UNPAINTED)
+        density[where] *= density_factors(cells, strength=self.config.density_strength)
+        painted = np.zeros(density.shape, dtype=bool)
+        painted[where] = True
+        colour, known = extrapolated(colour, painted, self.fringe)
+        colour[~known] = UNPAINTED
+        return Painting(smoke, density, colour, state)
 
     def _domain(self, smoke: Volume) -> Domain:
         """The cells that live in a frame."""
@@ -153,19 +175,6 @@ def stylize(
         painting = roll.paint(smoke, state)
         state = painting.state
         yield painting
-
-
-def _shown(smoke: Volume, state: RollState, config: StylizeConfig) -> Painting:
-    """The frame as a state shows it."""
-    colour = _unpainted(smoke)
-    density = smoke.density.copy()
-    at = state.cells - np.asarray(smoke.origin, dtype=np.int32)
-    inside = ((at >= 0) & (at < smoke.density.shape)).all(axis=1)
-    where = tuple(at[inside].T)
-    cells = state.values[:-1][inside]
-    colour[where] += config.strength * (colours(cells) - UNPAINTED)
-    density[where] *= density_factors(cells, strength=config.density_strength)
-    return Painting(smoke, density, colour, state)
 
 
 def _unpainted(smoke: Volume) -> FloatArray:
