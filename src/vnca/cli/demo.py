@@ -72,8 +72,9 @@ def demonstrate(options: Demo) -> None:
         )
         sequence = str(smoke / "plume_####.vdb")
         asked = f"{frames // 4}-{frames}"
-        paint(Stylize(run_folder, sequence, painted, frames=asked, preview=film))
-        scales = Model.load(run_folder).rule.scales
+        refine = 1 if options.quick else 2
+        paint(Stylize(run_folder, sequence, painted, frames=asked, preview=film, refine=refine))
+        scales = Model.load(run_folder).rule.refined(refine).scales
         gamma = scales.gamma / scales.density
         view = FilmConfig(rows=SHEET_SIZE, columns=SHEET_SIZE)
         shown = Render(str(painted), sheet, frames=asked, gamma=gamma, film=view)
