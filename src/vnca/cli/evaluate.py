@@ -126,9 +126,9 @@ def evaluate(options: Evaluate, model: Model) -> None:
         "measured": f"by vnca {vnca.__version__}, {run_facts('cpu', 1)['date']} UTC, "
         f"at {options.size}×{options.size} pixels",
     }
-    with whole_file(out / REPORT_NAME) as temporary:
-        temporary.write_text(report(found, picture, facts), encoding="utf-8")
     listed = measures(found)
+    with whole_file(out / REPORT_NAME) as temporary:
+        temporary.write_text(report(found, listed, picture, facts), encoding="utf-8")
     with whole_file(out / MEASURES_NAME) as temporary:
         described = {measure.name: measure.as_json() for measure in listed}
         temporary.write_text(json.dumps(described, indent=2) + "\n")

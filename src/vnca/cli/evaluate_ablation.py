@@ -16,7 +16,7 @@ from vnca.cli.options import chosen, parse, say
 from vnca.cli.sequence import beside
 from vnca.cli.train import Train, train
 from vnca.errors import OptionError
-from vnca.evaluation.estimators import Estimator, dis, ours
+from vnca.evaluation.estimators import Estimator, estimators
 from vnca.evaluation.motion import (
     MotionMeasures,
     measure_carried_noise,
@@ -142,11 +142,6 @@ def _is_trained(folder: Path, config: TrainConfig) -> bool:
         trained.training.get("iterations") == config.iterations
         and trained.rule.config == config.rule
     )
-
-
-def estimators() -> Mapping[str, Estimator]:
-    """What sees motion: the network that training uses, and one it never meets."""
-    return {"network": ours(), "dis": dis()}
 
 
 def as_json(measures: MotionMeasures) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Estimators of optical flow, all called alike."""
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -15,6 +15,16 @@ if TYPE_CHECKING:
 Estimator: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
 """Grey pictures `[row, column]` before and after, as displayed (sRGB, 0–1), to pixels moved,
 `[row, column, (right, down)]`, at the pixels of the first."""
+
+
+def estimators() -> Mapping[str, Estimator]:
+    """What sees motion: the network that training uses, and one it never meets.
+
+    Raises:
+        BackendUnavailableError: If OpenCV is not installed.
+        FileFormatError: If the network's weights are missing or damaged.
+    """
+    return {"network": ours(), "dis": dis()}
 
 
 def ours(device: str = "cpu") -> Estimator:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -138,9 +139,7 @@ def measure_style(
     Raises:
         GridError: If there is no smoke, or none that is opaque.
     """
-    box = Box((0, 0, 0), (0, 0, 0))
-    for smoke in frames:
-        box = box.union(smoke.box)
+    box = reduce(Box.union, (smoke.box for smoke in frames), Box((0, 0, 0), (0, 0, 0)))
     stage = Stage.around(frames, rule, size)
     gauge = StyleGauge(picture, round(size * style_scale))
     paintings = stylize(frames, rule, stepper(rule, backend), config or StylizeConfig(), box=box)

@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from vnca.evaluation.coherence import LONG
-from vnca.evaluation.measures import Measure, measures
+from vnca.evaluation.measures import Measure
 from vnca.evaluation.plots import Line, Shade, plot
 from vnca.evaluation.stage import Pair, Seen
 from vnca.evaluation.style import StyleDistances
@@ -27,15 +27,17 @@ _FAINTEST, _MARGIN = 0.05, 4  # opacity and pixels: to what a strip is cropped
 _STEEPEST = 0.5  # difference of perceived colours that is shown white
 
 
-def report(survey: Survey, picture: FloatArray, facts: Mapping[str, str]) -> str:
+def report(
+    survey: Survey, listed: Iterable[Measure], picture: FloatArray, facts: Mapping[str, str]
+) -> str:
     """The page.
 
     Args:
         survey: What was found.
+        listed: The measures of it.
         picture: The style picture, linear RGB `[r, c, 3]`.
         facts: What was measured, on what and by what: a line each.
     """
-    found = {measure.name: measure for measure in measures(survey)}
     style = files("vnca.evaluation").joinpath("report.css").read_text()
     last = survey.strip[-1]
     sections = [
@@ -50,7 +52,7 @@ def report(survey: Survey, picture: FloatArray, facts: Mapping[str, str]) -> str
         _figure(_shown(last.pair.painted), f"frame {last.frame}, painted"),
         _figure(_shown(last.pair.plain), f"frame {last.frame} as it comes, lit from above"),
         "</div>",
-        _table(found.values()),
+        _table(listed),
         *_style(survey),
         *_views(survey),
         *_time(survey),

@@ -9,7 +9,7 @@ from vnca.automaton.rule import Rule
 from vnca.errors import GridError
 from vnca.evaluation.coherence import Agreement, Coherence, Step, around
 from vnca.evaluation.density import DensityChange
-from vnca.evaluation.estimators import Estimator, dis, ours
+from vnca.evaluation.estimators import Estimator, estimators
 from vnca.evaluation.likeness import SIDES, Likeness, joined_likeness, likeness
 from vnca.evaluation.motion import (
     MotionMeasures,
@@ -127,8 +127,8 @@ def survey(
         GridError: If the smoke of the middle frame is opaque nowhere.
         BackendUnavailableError: If OpenCV is not installed.
     """
-    estimators = {"network": ours(), "dis": dis()}
-    coherence = Coherence(estimators["dis"])
+    seen_by = estimators()
+    coherence = Coherence(seen_by["dis"])
     frames, density, strip, style, turn = [], [], [], {}, None
     kept, compared = _spread(count, STRIP_FRAMES), _spread(count, STYLE_FRAMES)
     for at, painting in enumerate(paintings):
@@ -151,7 +151,7 @@ def survey(
                 ring,
                 joined_likeness([likeness(gauge, ring)]),
                 around(stage, ring[: len(RING)]),
-                _texture(rule, smoke, estimators),
+                _texture(rule, smoke, seen_by),
             )
     assert turn is not None, "there are fewer paintings than was said"
     return Survey(
@@ -164,11 +164,11 @@ def survey(
     )
 
 
-def _texture(rule: Rule, smoke: Volume, estimators: Mapping[str, Estimator]) -> TextureMotion | str:
+def _texture(rule: Rule, smoke: Volume, seen_by: Mapping[str, Estimator]) -> TextureMotion | str:
     try:
         return TextureMotion(
-            measure_motion(rule, smoke, estimators, size=MOTION_SIZE),
-            measure_carried_noise(rule, smoke, estimators, size=MOTION_SIZE),
+            measure_motion(rule, smoke, seen_by, size=MOTION_SIZE),
+            measure_carried_noise(rule, smoke, seen_by, size=MOTION_SIZE),
             measure_drift(rule, smoke, size=MOTION_SIZE),
         )
     except GridError as error:  # without velocity, or at rest
