@@ -276,6 +276,29 @@ def test_a_training_that_begins_with_a_texture_goes_on_from_anywhere(
     assert not (run / CHECKPOINT_NAME).exists()
 
 
+def test_a_texture_that_is_to_be_overwritten_is_not_taken_for_the_new_one(
+    vnca: Vnca,
+    frame: Path,
+    style: Path,
+    tiny: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole, run = tmp_path / "whole", tmp_path / "run"
+    options = [*tiny, "--texture", 1, "--seed", 5]
+    assert vnca("train", frame, style, "--out", whole, *options).code == 0
+    assert vnca("train", frame, style, "--out", run, *tiny, "--texture", 1).code == 0
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("vnca.cli.texture_train.train", stop)
+        vnca("train", frame, style, "--out", run, *options, "--overwrite")
+    assert vnca("train", "--resume", run).code == 0
+    assert (run / MODEL_NAME).read_bytes() == (whole / MODEL_NAME).read_bytes()
+
+
 def test_inputs_that_change_while_the_texture_is_trained_are_refused(
     vnca: Vnca,
     frame: Path,

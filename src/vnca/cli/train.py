@@ -27,6 +27,7 @@ from vnca.cli.session import (
 )
 from vnca.errors import GridError, OptionError
 from vnca.features.vgg import VGG16
+from vnca.files import remove_file
 from vnca.io.image import read_image
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.texturing.beginning import SHARES, beginning_config, deaf_to_priors
@@ -141,6 +142,9 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         share = SHARES[options.preset] if options.texture is None else options.texture
         beginning = beginning_config(config, share, max(trainer.scene.domain.box.shape))
         if beginning is not None:
+            if checkpoint is None and options.overwrite:
+                # Resuming must not take the texture of the run that was there for this one's.
+                remove_file(options.out / TEXTURE_FOLDER / MODEL_NAME)
             folder.reserve(Checkpoint({}, session.inputs, COMMAND, session.asked))
             texture = _texture(options, beginning, goes_on=checkpoint is not None)
             trainer.begin_with(deaf_to_priors(texture))
