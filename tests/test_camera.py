@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.camera import Orthographic, Perspective, frame_box
+from vnca.camera import Orthographic, Perspective, frame_box, turntable
 from vnca.errors import OptionError
 
 ANGLES = (st.floats(-360, 360), st.floats(-90, 90))
@@ -87,6 +87,32 @@ def test_framed_box_fills_the_picture_and_stays_inside(azimuth, elevation, view,
     assert depth.min() > camera.near
 
 
+@settings(deadline=None, max_examples=60)
+@given(st.floats(-180, 180), st.floats(0, 90), st.sampled_from([3.0, 10.0, 40.0]))
+def test_a_turntable_sees_a_box_as_large_from_all_sides(azimuth, steepest, tall) -> None:
+    lower, upper, margin = (2.0, -3.0, 0.0), (10.0, 9.0, tall), 0.05
+    corners = np.array(list(product(*zip(lower, upper, strict=True))))
+    views = {"steepest": steepest, "margin": margin}
+    assert turntable(lower, upper, azimuth, steepest, **views).height == pytest.approx(
+        turntable(lower, upper, **views).height
+    )
+    for elevation in np.linspace(-steepest, steepest, 9):
+        camera = turntable(lower, upper, azimuth, elevation, **views)
+        row, column, _ = camera.project(corners, 100, 100)
+        for at in (row + 0.5) / 100, (column + 0.5) / 100:
+            assert at.min() >= margin - 1e-6
+            assert at.max() <= 1 - margin + 1e-6
+
+
+def test_a_turntable_is_no_farther_away_than_its_widest_view_asks_for() -> None:
+    level = turntable((0, 0, 0), (30, 40, 20), margin=0.0, steepest=0)
+    assert level.height == pytest.approx(50)
+    assert level.target == (15, 20, 10)
+    assert turntable((0, 0, 0), (30, 40, 20), margin=0.0).height == pytest.approx(
+        np.hypot(50, 20), rel=1e-9
+    )
+
+
 @pytest.mark.parametrize(
     "make",
     [
@@ -97,6 +123,7 @@ def test_framed_box_fills_the_picture_and_stays_inside(azimuth, elevation, view,
         lambda: frame_box((0, 0, 0), (1, 1, 1), margin=0.5),
         lambda: frame_box((0, 0, 0), (1, 1, 1), aspect=0),
         lambda: frame_box((0, 0, 0), (1, 1, 1), field_of_view=0),
+        lambda: turntable((0, 0, 0), (1, 0, 1)),
     ],
 )
 def test_impossible_cameras_are_refused(make) -> None:

@@ -169,11 +169,7 @@ def frame_box(
     Raises:
         OptionError: If the box is empty or a value is out of range.
     """
-    low, high = np.asarray(lower, np.float64), np.asarray(upper, np.float64)
-    if not (high > low).all():
-        raise OptionError(f"box to frame: expected lower below upper, got {lower} to {upper}")
-    if not 0 <= margin < 0.5:
-        raise OptionError(f"margin: expected 0 to less than 0.5, got {margin}")
+    low, high = _checked_box(lower, upper, margin)
     if not aspect > 0:
         raise OptionError(f"aspect: expected more than 0, got {aspect}")
     axes = view_axes(azimuth, elevation)
@@ -197,6 +193,41 @@ def frame_box(
     )
 
 
+def turntable(
+    lower: Sequence[float],
+    upper: Sequence[float],
+    azimuth: float = 0.0,
+    elevation: float = 0.0,
+    *,
+    steepest: float = 90.0,
+    margin: float = 0.04,
+) -> Orthographic:
+    """The camera of a square picture that sees a box as large from every side.
+
+    Where `frame_box` comes as near as each side allows, this one stays as far away as the widest
+    side asks for.
+
+    Args:
+        lower: Least corner of the box, cell coordinates.
+        upper: Greatest corner.
+        azimuth: Degrees, as described at the top of this module.
+        elevation: Degrees.
+        steepest: All corners are inside from up to this many degrees above and below the horizon.
+        margin: Part of the picture's height and width left free on every side.
+
+    Raises:
+        OptionError: If the box is empty or a value is out of range.
+    """
+    low, high = _checked_box(lower, upper, margin)
+    width, depth, height = high - low
+    across = math.hypot(width, depth)
+    # A box seen along its diagonal is tallest where it stands on the edge of its two corners.
+    tilt = min(math.radians(steepest), math.atan2(across, height))
+    tallest = height * math.cos(tilt) + across * math.sin(tilt)
+    needed = max(across, tallest) / (1 - 2 * margin)
+    return Orthographic(_point((low + high) / 2), azimuth, elevation, height=float(needed))
+
+
 def view_axes(azimuth: float, elevation: float) -> tuple[AnyArray, AnyArray, AnyArray]:
     """Unit vectors to the right, up and forward in the picture, for angles in degrees."""
     a, e = math.radians(azimuth), math.radians(elevation)
@@ -206,6 +237,17 @@ def view_axes(azimuth: float, elevation: float) -> tuple[AnyArray, AnyArray, Any
     up = math.sin(e) * level + math.cos(e) * z
     forward = math.cos(e) * level - math.sin(e) * z
     return right, up, forward
+
+
+def _checked_box(
+    lower: Sequence[float], upper: Sequence[float], margin: float
+) -> tuple[AnyArray, AnyArray]:
+    low, high = np.asarray(lower, np.float64), np.asarray(upper, np.float64)
+    if not (high > low).all():
+        raise OptionError(f"box to frame: expected lower below upper, got {lower} to {upper}")
+    if not 0 <= margin < 0.5:
+        raise OptionError(f"margin: expected 0 to less than 0.5, got {margin}")
+    return low, high
 
 
 def _fit(across: AnyArray, forward: AnyArray, slope: float) -> tuple[float, float]:

@@ -11,7 +11,8 @@ import pytest
 from vnca.automaton.model import MODEL_NAME
 
 Vnca = Callable[..., Any]
-SMALL = ("--size", "64", "--warmup", "4", "--steps-per-frame", "2")
+FEW = ("--warmup", "4", "--steps-per-frame", "2")
+SMALL = ("--size", "64", "--style-scale", "1", *FEW)
 NAMES = {
     "style.gap_closed", "views.spread", "views.reprojection", "time.warp_short", "time.warp_long",
     "time.flow", "motion.direction", "motion.magnitude", "motion.transport",
@@ -83,12 +84,18 @@ def test_what_a_run_was_trained_on_is_what_it_is_measured_on(
 ) -> None:
     run = tmp_path / "trained"
     assert vnca("train", frame, style, "--out", run, *tiny, "--view.gamma", "3").code == 0
-    outcome = vnca("evaluate", run, "--velocity-grid", "none", *SMALL)
+    evaluated = ("evaluate", run, "--velocity-grid", "none", "--size", "112", *FEW)
+    outcome = vnca(*evaluated)
     assert outcome.code == 0, outcome.err
     measures = json.loads((run / "evaluation" / "report.json").read_text())
     assert list(measures["style.gap_closed"]["frames"]) == ["2"]
     assert measures["time.warp_short"]["reason"] == "it takes 2 frames in a row"
     assert "Not measured" in (run / "evaluation" / "report.html").read_text()
+    # The picture is compared as large as it was shown in training: as a finer grid has it.
+    assert "--size 112: makes the picture" in vnca(*evaluated, "--refine", "2").complaint
+    fine = ("--refine", "2", "--style-scale", "0.6", "--out", run / "fine")
+    assert vnca(*evaluated, *fine).code == 0
+    assert "2 times as fine" in (run / "fine" / "report.html").read_text()
     frame.unlink()
     assert str(frame) in vnca("evaluate", run, *SMALL).complaint
 
@@ -124,6 +131,8 @@ def test_what_cannot_be_measured_is_told_in_one_line(
 def test_what_is_not_where_it_should_be_is_told_before_long_work(
     vnca: Vnca, model: Path, smoke: Path, style: Path
 ) -> None:
+    unknown = vnca("evaluate", model, smoke, "--style", style).complaint
+    assert "how many cells wide its picture was; set --style-scale" in unknown
     assert "'night.png' is; name it with --style" in vnca("evaluate", model, smoke).complaint
     assert "no such file" in vnca("evaluate", model, smoke, "--style", "none.png").complaint
     out = ("--style", style, "--out", style / "report")

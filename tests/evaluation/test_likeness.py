@@ -53,17 +53,37 @@ def test_a_sequence_is_looked_at_every_few_frames_and_at_its_end(
     tiny_smoke: Volume, picture: FloatArray
 ) -> None:
     frames = [dataclasses.replace(tiny_smoke, frame=number) for number in range(4)]
-    found = measure_style(rule(), frames, picture, size=64, every=2)
+    found = measure_style(rule(), frames, picture, cells=24, size=96, every=2)
     assert found.sights == SIDES * 2
-    assert found.shares == measure_style(rule(), frames, picture, size=64, every=2).shares
+    again = measure_style(rule(), frames, picture, cells=24, size=96, every=2)
+    assert found.shares == again.shares
+
+
+def test_a_finer_painting_is_compared_with_a_picture_half_as_large(
+    tiny_smoke: Volume, picture: FloatArray
+) -> None:
+    stage = Stage.around([tiny_smoke], rule(), 64)
+    fine = stage.refined(2)
+    assert fine.scale == pytest.approx(stage.scale / 2)
+    sight = SIDES[1]
+    plain = Coloured.plain(tiny_smoke)._replace(
+        colour=np.ones((*tiny_smoke.density.shape, 3), np.float32)
+    )
+    finer = tiny_smoke.refined(2)
+    also = Coloured(finer.density, np.ones((*finer.density.shape, 3), np.float32), finer.origin)
+    pair = stage.look(plain, sight), fine.look(also, sight)
+    assert np.abs(pair[0].opacity - pair[1].opacity).mean() < 0.02
+    few = {"cells": 48, "size": 96}
+    found = measure_style(rule(), [tiny_smoke], picture, **few, refine=2)
+    assert found.shares != measure_style(rule(), [tiny_smoke], picture, **few).shares
 
 
 def test_smoke_that_cannot_be_seen_is_refused(tiny_smoke: Volume, picture: FloatArray) -> None:
     with pytest.raises(GridError, match="opaque in no frame"):
-        measure_style(rule(gamma=1e-3), [tiny_smoke], picture, size=64)
+        measure_style(rule(gamma=1e-3), [tiny_smoke], picture, cells=24, size=64)
     nothing = dataclasses.replace(tiny_smoke, density=np.zeros_like(tiny_smoke.density))
     with pytest.raises(GridError, match="no smoke in any frame"):
-        measure_style(rule(), [nothing], picture, size=64)
+        measure_style(rule(), [nothing], picture, cells=24, size=64)
 
 
 def test_plain_smoke_is_grey_and_its_shape_can_be_seen(tiny_smoke: Volume) -> None:

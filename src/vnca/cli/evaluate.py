@@ -16,13 +16,13 @@ from vnca.automaton.stepper import stepper
 from vnca.bench.machine import run_facts
 from vnca.cli.options import is_given, parse, say
 from vnca.cli.progress import tracked
-from vnca.cli.recorded import recorded_smoke
+from vnca.cli.recorded import PICTURE_CELLS, recorded_smoke
 from vnca.cli.sequence import open_sequence, sequence_box, volumes
 from vnca.errors import OptionError
 from vnca.evaluation.measures import Measure, measures
 from vnca.evaluation.report import report
-from vnca.evaluation.stage import Stage
-from vnca.evaluation.style import StyleGauge
+from vnca.evaluation.stage import SIZE, Stage
+from vnca.evaluation.style import SMALLEST, StyleGauge
 from vnca.evaluation.survey import survey
 from vnca.files import whole_file, writable_folder
 from vnca.io.image import read_image
@@ -36,6 +36,8 @@ from vnca.typing import FloatArray
 
 REPORT_NAME = "report.html"
 MEASURES_NAME = "report.json"
+LARGEST_PICTURE = 4096
+"""Pixels along the shorter side of the picture."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +58,12 @@ class Evaluate:
     """Frames to paint, such as 30-53 or 1,4,7-9; all unless given."""
     style: Path | None = None
     """The picture; that of the training unless given."""
-    style_scale: float = 1.0
-    """Shorter side of the picture relative to the views: as in training, where the smoke fills as
-    many cells; half of it where it fills twice as many."""
-    size: int = 192
+    style_scale: float | None = None
+    """Shorter side of the picture relative to the views; as many cells as in the training unless
+    given."""
+    refine: Literal[1, 2, 3, 4] = 1
+    """Paint on a grid so many times as fine as that of the smoke."""
+    size: int = SIZE
     """Rows and columns of the views, pixels."""
     backend: Literal["auto", "native", "reference"] = "auto"
     """What computes the automaton."""
@@ -71,11 +75,6 @@ class Evaluate:
     def __post_init__(self) -> None:
         if self.size < 64:
             raise OptionError(f"--size {self.size}: at least 64 pixels are needed")
-        if not 64 <= self.size * self.style_scale <= 4096:
-            raise OptionError(
-                f"--style-scale {self.style_scale:g}: makes the picture "
-                f"{self.size * self.style_scale:.0f} pixels wide, of 64 to 4096"
-            )
 
 
 def run(arguments: Sequence[str]) -> None:
@@ -103,17 +102,24 @@ def evaluate(options: Evaluate, model: Model) -> None:
     folder = options.run if options.run.is_dir() else options.run.parent
     out = writable_folder(options.out or folder / "evaluation")
     picture = _picture(options, model, folder)
-    gauge = StyleGauge(picture, round(options.size * options.style_scale))
     sequence = open_sequence(_sequence(options, folder), options.frames)
     smoke = with_fitted_scale(options.smoke, sequence)
     box = sequence_box(sequence, smoke)
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.
     shapes = volumes(sequence, dataclasses.replace(smoke, velocity_grid=NO_VELOCITY))
-    stage = Stage.around(shapes, model.rule, options.size)
-    step = stepper(model.rule, options.backend)
-    paintings = stylize(volumes(sequence, smoke), model.rule, step, options.config, box=box)
+    refine = options.refine
+    stage = Stage.around(shapes, model.rule, options.size).refined(refine)
+    gauge = StyleGauge(picture, _shorter(options, model, stage))
+    paintings = stylize(
+        volumes(sequence, smoke),
+        model.rule,
+        stepper(model.rule, options.backend),
+        options.config,
+        box=box,
+        refine=refine,
+    )
     tracking = tracked(paintings, "painting and measuring", len(sequence), "frames")
-    found = survey(tracking, len(sequence), model.rule, stage, gauge)
+    found = survey(tracking, len(sequence), model.rule.refined(refine), stage, gauge)
     facts = {
         "title": f"{folder.resolve().name} on {sequence[0].path.resolve().parent.name}",
         "picture": str(model.training.get("style", options.style)),
@@ -124,7 +130,8 @@ def evaluate(options: Evaluate, model: Model) -> None:
             if name in model.training
         ),
         "measured": f"by vnca {vnca.__version__}, {run_facts('cpu', 1)['date']} UTC, "
-        f"at {options.size}×{options.size} pixels",
+        f"at {options.size}×{options.size} pixels"
+        + (f", painted on a grid {refine} times as fine" if refine > 1 else ""),
     }
     listed = measures(found)
     with whole_file(out / REPORT_NAME) as temporary:
@@ -159,6 +166,27 @@ def _picture(options: Evaluate, model: Model, folder: Path) -> FloatArray:
         )
     with as_file(ours) as path:
         return read_image(path)
+
+
+def _shorter(options: Evaluate, model: Model, stage: Stage) -> int:
+    """The picture's shorter side where it is compared, pixels."""
+    recorded = model.training.get(PICTURE_CELLS)
+    if options.style_scale is not None:
+        option = f"--style-scale {options.style_scale:g}"
+        shorter = options.size * options.style_scale
+    elif isinstance(recorded, (int, float)):
+        option = f"--size {options.size}"
+        shorter = recorded * stage.scale
+    else:
+        raise OptionError(
+            f"{options.run}: does not tell how many cells wide its picture was; set --style-scale"
+        )
+    if not SMALLEST <= shorter <= LARGEST_PICTURE:
+        raise OptionError(
+            f"{option}: makes the picture {shorter:.0f} pixels wide, of {SMALLEST} to "
+            f"{LARGEST_PICTURE}"
+        )
+    return round(shorter)
 
 
 def _sequence(options: Evaluate, folder: Path) -> str:

@@ -11,6 +11,9 @@ from vnca.automaton.model import Model, from_record
 from vnca.errors import ModelError
 from vnca.io.smoke_format import SmokeFormat
 
+PICTURE_CELLS = "picture_cells"
+"""What says in a model how many cells wide the rule was shown its picture, the shorter side."""
+
 T = TypeVar("T")
 
 

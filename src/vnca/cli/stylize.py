@@ -32,7 +32,7 @@ from vnca.kernels.update.backend import choose
 from vnca.kernels.update.native import Precision
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.painter import OnError, Painter
-from vnca.stylize.roll import FRINGE, Roll
+from vnca.stylize.roll import Roll
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
@@ -133,12 +133,11 @@ def paint(options: Stylize, model: Model | None = None) -> None:
     box = sequence_box(sequence, smoke, without_broken=options.on_error != "stop")
     backend = choose(options.backend)
     roll = Roll(
-        rule.refined(options.refine),
+        rule,
         stepper(rule, backend, precision=options.precision),
         options.config,
-        box.refined(options.refine),
-        fringe=FRINGE * options.refine,
-    )
+        box,
+    ).refined(options.refine)
     painter = Painter(
         sequence,
         options.out,

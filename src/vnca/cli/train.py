@@ -13,6 +13,7 @@ from vnca.automaton.model import MODEL_NAME, Model
 from vnca.automaton.rule import Rule
 from vnca.cli import texture_train
 from vnca.cli.options import chosen, is_given, parse, say
+from vnca.cli.recorded import PICTURE_CELLS
 from vnca.cli.sequence import beside
 from vnca.cli.session import (
     ResumeOptions,
@@ -35,7 +36,8 @@ from vnca.texturing.config import TextureConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.memory import memory_budget
-from vnca.training.smoke import smoke_trainer
+from vnca.training.smoke import choose_scales, smoke_trainer
+from vnca.training.smoke_scene import smoke_bounds, view_width
 
 COMMAND = "train"
 TEXTURE_FOLDER = "texture"
@@ -114,6 +116,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
     with fitting(config, "this frame"):
         budget = memory_budget(options.memory_budget)
         trainer = smoke_trainer(smoke, style, config, vgg, device=device, memory_budget=budget)
+    width = view_width(smoke_bounds(smoke, choose_scales(smoke, config).density))
     training = {
         "frame": options.frame.name,
         "style": options.style.name,
@@ -121,6 +124,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         "seed": config.seed,
         "device": str(device),
         "smoke": dataclasses.asdict(smoke_format),
+        PICTURE_CELLS: round(config.appearance.style_scale * width, 2),
         **judged_by(vgg),
     }
     frame = [smoke.density, smoke.origin]
@@ -140,7 +144,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         if checkpoint is not None:
             checkpoint.require(session.inputs, folder.path / CHECKPOINT_NAME)
         share = SHARES[options.preset] if options.texture is None else options.texture
-        beginning = beginning_config(config, share, max(trainer.scene.domain.box.shape))
+        beginning = beginning_config(config, share, width)
         if beginning is not None:
             if checkpoint is None and options.overwrite:
                 # Resuming must not take the texture of the run that was there for this one's.

@@ -9,7 +9,7 @@ import numpy as np
 from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
 from vnca.errors import GridError
-from vnca.evaluation.stage import Coloured, Pair, Sight, Stage
+from vnca.evaluation.stage import SIZE, Coloured, Pair, Sight, Stage
 from vnca.evaluation.style import StyleDistances, StyleGauge, gap_closed, mean_distances
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.roll import stylize
@@ -118,8 +118,9 @@ def measure_style(
     frames: Sequence[Volume],
     picture: FloatArray,
     *,
-    size: int = 192,
-    style_scale: float = 1.0,
+    cells: float,
+    refine: int = 1,
+    size: int = SIZE,
     every: int = 6,
     config: StylizeConfig | None = None,
     backend: str = "auto",
@@ -130,8 +131,9 @@ def measure_style(
         rule: What paints.
         frames: The sequence.
         picture: The style picture, linear RGB `[r, c, 3]`.
+        cells: Shorter side of the picture as the rule was shown it, cells.
+        refine: The painting's grid is so many times as fine as the smoke's.
         size: Rows and columns of the views.
-        style_scale: Shorter side of the picture relative to the views, as in training.
         every: So many frames are painted for one that is looked at; the last one is.
         config: How the rule is applied.
         backend: What computes the automaton.
@@ -140,9 +142,10 @@ def measure_style(
         GridError: If there is no smoke, or none that is opaque.
     """
     box = reduce(Box.union, (smoke.box for smoke in frames), Box((0, 0, 0), (0, 0, 0)))
-    stage = Stage.around(frames, rule, size)
-    gauge = StyleGauge(picture, round(size * style_scale))
-    paintings = stylize(frames, rule, stepper(rule, backend), config or StylizeConfig(), box=box)
+    stage = Stage.around(frames, rule, size).refined(refine)
+    gauge = StyleGauge(picture, round(cells * stage.scale))
+    step, config = stepper(rule, backend), config or StylizeConfig()
+    paintings = stylize(frames, rule, step, config, box=box, refine=refine)
     parts = []
     for at, painting in enumerate(paintings, 1):
         if (len(frames) - at) % every == 0:

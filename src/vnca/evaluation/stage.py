@@ -1,7 +1,7 @@
 """Where the smoke of a sequence is looked at, and what is seen of it."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +9,7 @@ import torch
 from scipy.ndimage import gaussian_filter
 
 from vnca.automaton.rule import SMOKE_THRESHOLD, Rule
-from vnca.camera import Orthographic, Perspective, frame_box
+from vnca.camera import Orthographic, turntable
 from vnca.errors import GridError
 from vnca.render.velocity import projected_velocity
 from vnca.render.view import render
@@ -20,6 +20,8 @@ from vnca.volume import Volume
 
 OPAQUE = 0.8
 """Opacity from which a pixel counts as smoke."""
+SIZE = 224
+"""Rows and columns of pictures, unless told otherwise."""
 STEP = 0.5
 """Distance between samples along a ray, cells."""
 _GREY = 0.214  # linear, of sRGB ½: what a state of zeros shows
@@ -113,10 +115,10 @@ class Stage:
 
     box: Box
     gamma: float
-    size: int = 192
+    size: int = SIZE
 
     @classmethod
-    def around(cls, frames: Iterable[Volume], rule: Rule, size: int = 192) -> "Stage":
+    def around(cls, frames: Iterable[Volume], rule: Rule, size: int = SIZE) -> "Stage":
         """Framed on what a rule takes for smoke, as bright as what it was trained on.
 
         Raises:
@@ -130,13 +132,22 @@ class Stage:
             raise GridError("there is no smoke in any frame; choose others")
         return cls(box, rule.scales.gamma / rule.scales.density, size)
 
-    def camera(self, sight: Sight, origin: Index = (0, 0, 0)) -> Orthographic | Perspective:
+    def refined(self, factor: int) -> "Stage":
+        """The same place on a grid `factor` times as fine along each axis."""
+        return replace(self, box=self.box.refined(factor), gamma=self.gamma / factor)
+
+    @property
+    def scale(self) -> float:
+        """Pixels per cell, the same from all sides."""
+        return self.size / self.camera(Sight(0.0, 0.0)).height
+
+    def camera(self, sight: Sight, origin: Index = (0, 0, 0)) -> Orthographic:
         """The camera that sees all of the box, in coordinates of arrays that begin at `origin`."""
         lower, upper = (
             (np.subtract(corner, origin) - 0.5).tolist()
             for corner in (self.box.lower, self.box.upper)
         )
-        return frame_box(lower, upper, *sight)
+        return turntable(lower, upper, *sight)
 
     @torch.no_grad()
     def look(self, smoke: Coloured, sight: Sight) -> Seen:

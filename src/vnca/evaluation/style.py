@@ -23,6 +23,8 @@ SLICES = 64
 """Directions in which colours, and responses of filters, are compared."""
 WINDOW = 32
 """Rows and columns of the windows whose spectrum is taken, pixels."""
+SMALLEST = 2 * WINDOW
+"""Shorter side of a picture that is large enough to compare with, pixels."""
 FEWEST = 32
 """Positions of a level without which it says nothing about texture."""
 
@@ -103,8 +105,8 @@ class StyleGauge:
 
         Args:
             picture: Linear RGB `[r, c, 3]`.
-            shorter: Its shorter side where it is compared, pixels; as long as that of the views
-                that a rule was trained on, times its style scale, in pixels of these views.
+            shorter: Its shorter side where it is compared, pixels: as many cells as in the
+                training.
 
         Raises:
             ShapeError: If it is not `[r, c, 3]`.
@@ -112,8 +114,8 @@ class StyleGauge:
         """
         if picture.ndim != 3 or picture.shape[2] != 3:
             raise ShapeError(f"style picture: expected [r, c, 3], got {picture.shape}")
-        if shorter < 2 * WINDOW:
-            raise OptionError(f"style picture: {shorter} pixels are too few, take {2 * WINDOW}")
+        if shorter < SMALLEST:
+            raise OptionError(f"style picture: {shorter} pixels are too few, take {SMALLEST}")
         rows, columns = picture.shape[:2]
         factor = shorter / min(rows, columns)
         self.picture = resize(picture, round(rows * factor), round(columns * factor)).clip(0, 1)

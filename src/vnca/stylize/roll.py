@@ -8,7 +8,7 @@ Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -101,6 +101,15 @@ class Roll:
         """Where cells live: as asked for, or else as in training."""
         return self.config.domain or self.rule.config.domain
 
+    def refined(self, factor: int) -> "Roll":
+        """The same on a grid `factor` times as fine along each axis, for smoke refined alike."""
+        return replace(
+            self,
+            rule=self.rule.refined(factor),
+            box=self.box.refined(factor),
+            fringe=self.fringe * factor,
+        )
+
     def start(self) -> RollState:
         """The state before the first frame."""
         return RollState.empty(self.rule.config.channels)
@@ -166,13 +175,23 @@ class Roll:
 
 
 def stylize(
-    frames: Iterable[Volume], rule: Rule, step: Step, config: StylizeConfig, *, box: Box
+    frames: Iterable[Volume],
+    rule: Rule,
+    step: Step,
+    config: StylizeConfig,
+    *,
+    box: Box,
+    refine: int = 1,
 ) -> Iterator[Painting]:
-    """Paint a sequence frame by frame, reading one at a time; see `Roll` for the arguments."""
-    roll = Roll(rule, step, config, box)
+    """Paint a sequence frame by frame, reading one at a time.
+
+    See `Roll` for the other arguments; `refine` times as fine as the smoke's is the grid of the
+    paintings.
+    """
+    roll = Roll(rule, step, config, box).refined(refine)
     state = roll.start()
     for smoke in frames:
-        painting = roll.paint(smoke, state)
+        painting = roll.paint(smoke.refined(refine), state)
         state = painting.state
         yield painting
 

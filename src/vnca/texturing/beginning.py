@@ -17,13 +17,13 @@ LARGEST_PICTURE = 128
 """Cells along the shorter side of the picture, at most: its patterns are to fit the block."""
 
 
-def beginning_config(config: TrainConfig, share: float, cells: int) -> TextureConfig | None:
+def beginning_config(config: TrainConfig, share: float, cells: float) -> TextureConfig | None:
     """How the texture is trained for a training on smoke, or None if it is not to be.
 
     Args:
         config: The training on smoke. The rule is as large, and the picture in cells too.
         share: Iterations for each of that training.
-        cells: Longest side of the smoke.
+        cells: Those across a view of the smoke.
     """
     iterations = round(share * config.iterations)
     if iterations == 0:

@@ -10,7 +10,7 @@ from torch import Tensor
 from vnca.automaton.domain import Domain
 from vnca.automaton.priors import priors
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
-from vnca.camera import Camera, Orthographic, Perspective, frame_box
+from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable
 from vnca.errors import GridError
 from vnca.render.colour import linear_to_srgb, srgb_to_linear
 from vnca.render.velocity import projected_velocity
@@ -96,20 +96,23 @@ class SmokeScene(Scene[SmokeSight]):
     def camera(
         self, azimuth: float, elevation: float, *, aspect: float = 1.0
     ) -> Orthographic | Perspective:
-        """A camera around the smoke, framed on its bounding box."""
-        lower, upper = (np.asarray(c) - self.domain.box.lower for c in self.box)
-        return frame_box(
-            (lower - 0.5).tolist(), (upper - 0.5).tolist(), azimuth, elevation, aspect=aspect
-        )
+        """A camera around the smoke, as near to its bounding box as that side allows."""
+        return frame_box(*self._corners, azimuth, elevation, aspect=aspect)
+
+    @property
+    def _corners(self) -> tuple[list[float], list[float]]:
+        lower, upper = (np.asarray(c) - self.domain.box.lower - 0.5 for c in self.box)
+        return lower.tolist(), upper.tolist()
 
     def sight(self, random: np.random.Generator) -> SmokeSight:
         """A camera around the smoke, and where along the rays sampling begins."""
         azimuths = self.view.azimuths
         azimuth = float(random.choice(azimuths)) if azimuths else random.uniform(0, 360)
         elevation = random.uniform(-self.view.elevation, self.view.elevation)
+        camera = turntable(*self._corners, azimuth, elevation, steepest=0)
         # Samples at random depths: no pattern can hide between them.
         offset = float(random.uniform()) if self.view.mode == "sane" else 0.0
-        return SmokeSight(self.camera(azimuth, elevation), offset)
+        return SmokeSight(camera, offset)
 
     def pictures(
         self, state: Tensor, sight: SmokeSight, background: Tensor
@@ -171,6 +174,14 @@ class SmokeScene(Scene[SmokeSight]):
     def _painted_density(self, state: Tensor) -> Tensor:
         change = state[:-1, DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
         return self.dense(self._density * (1 + change))
+
+
+def view_width(box: Box) -> float:
+    """Cells across a view of training, the same from all sides: patterns keep their size.
+
+    Views from above or below may cut off corners of the box that holds the smoke.
+    """
+    return turntable(box.lower, box.upper, steepest=0).height
 
 
 def smoke_bounds(smoke: Volume, density_scale: float) -> Box:
