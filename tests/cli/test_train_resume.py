@@ -330,5 +330,30 @@ def test_what_begins_with_a_texture_differs_from_what_does_not(
     assert not (tmp_path / "without" / "texture").exists()
 
 
+def test_a_texture_that_is_trained_already_is_what_training_begins_with(
+    vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
+) -> None:
+    both, given = tmp_path / "both", tmp_path / "given"
+    options = ("train", frame, style, *tiny[: tiny.index("--texture")])
+    assert vnca(*options, "--out", both, "--texture", 1).code == 0
+    assert vnca(*options, "--out", given, "--begin-with", both / "texture").code == 0
+    assert not (given / "texture").exists()
+    assert (given / MODEL_NAME).read_bytes() == (both / MODEL_NAME).read_bytes()
+
+
+def test_a_texture_that_cannot_be_begun_with_is_refused(
+    vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    options = ("train", frame, style, *tiny[: tiny.index("--texture")])
+    assert vnca(*options, "--out", run, "--texture", 0).code == 0
+    other = (*options, "--out", tmp_path / "other", "--begin-with", run)
+    complaint = vnca(*other, "--hidden", 9).complaint
+    assert f"--begin-with {run}" in complaint
+    assert "in place of 9" in complaint
+    assert "one of them" in vnca(*other, "--texture", 1).complaint
+    assert not (tmp_path / "other").exists()
+
+
 def test_a_share_of_texture_below_zero_is_refused(vnca: Vnca, frame: Path, style: Path) -> None:
     assert "--texture -1" in vnca("train", frame, style, "--out", "x", "--texture", -1).complaint

@@ -10,7 +10,7 @@ import torch
 import tyro
 
 from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule
+from vnca.automaton.rule import Rule, RuleConfig
 from vnca.cli import texture_train
 from vnca.cli.options import chosen, is_given, parse, say
 from vnca.cli.recorded import PICTURE_CELLS
@@ -31,7 +31,7 @@ from vnca.features.vgg import VGG16
 from vnca.files import remove_file
 from vnca.io.image import read_image
 from vnca.io.smoke import SmokeFormat, read_smoke
-from vnca.texturing.beginning import SHARES, beginning_config, deaf_to_priors
+from vnca.texturing.beginning import SHAPE, SHARES, beginning_config, deaf_to_priors
 from vnca.texturing.config import TextureConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import PRESETS, TrainConfig
@@ -60,6 +60,8 @@ class Train(TrainingOptions):
     texture: float | None = None
     """Iterations on a solid texture of the picture for each one on the smoke, made before those:
     patterns come from there. 0 begins with nothing."""
+    begin_with: Path | None = None
+    """A solid texture of the picture that is trained already, to begin with instead."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=TrainConfig)
@@ -69,6 +71,8 @@ class Train(TrainingOptions):
         super().__post_init__()
         if self.texture is not None and not 0 <= self.texture <= 1000:
             raise OptionError(f"--texture {self.texture:g}: must be from 0 to 1000")
+        if self.texture is not None and self.begin_with is not None:
+            raise OptionError("--texture, --begin-with: one of them, not both")
 
 
 @dataclass(frozen=True)
@@ -145,7 +149,9 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
             checkpoint.require(session.inputs, folder.path / CHECKPOINT_NAME)
         share = SHARES[options.preset] if options.texture is None else options.texture
         beginning = beginning_config(config, share, width)
-        if beginning is not None:
+        if options.begin_with is not None:
+            trainer.begin_with(deaf_to_priors(_given(options.begin_with, config.rule)))
+        elif beginning is not None:
             if checkpoint is None and options.overwrite:
                 # Resuming must not take the texture of the run that was there for this one's.
                 remove_file(options.out / TEXTURE_FOLDER / MODEL_NAME)
@@ -160,6 +166,24 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         )
     session.run(checkpoint, *notes)
     return options.out
+
+
+def _given(path: Path, wanted: RuleConfig) -> Rule:
+    """The texture to begin with that was named.
+
+    Raises:
+        VncaError: If it cannot be read, or is a rule of another shape.
+    """
+    rule = Model.load(path).rule
+    for name in SHAPE:
+        its, ours = (getattr(config, name) for config in (rule.config, wanted))
+        if its != ours:
+            option = f"--{name.replace('_', '-')}"
+            raise OptionError(
+                f"--begin-with {path}: was trained with {option} {its:g}; add that, in place of "
+                f"{ours:g}"
+            )
+    return rule
 
 
 def _texture(options: Train, config: TextureConfig, *, goes_on: bool) -> Rule:

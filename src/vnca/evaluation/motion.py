@@ -95,7 +95,7 @@ def measure_motion(
     Raises:
         GridError: If there is no smoke in the frame, it has no velocity, or nothing in it moves.
 
-    Reference: VNCA table 2 (L_dir and L_mag at a fixed density frame).
+    Reference: VNCA table 3 (L_dir and L_mag at a fixed density frame).
     """
     scene = _moving_scene(rule, smoke, size)
     config = StylizeConfig(warmup=warmup, seed=seed)
