@@ -2,21 +2,24 @@
 
     python docs/gallery/smoke.py WORK
 
-Simulates a plume, jets and a ring, trains a rule for each of eight pictures on one frame of the
-plume, and paints and films all three with it: two scenes it never saw. What is in the folder WORK
-already is not made again. Films go to `smoke/`, beside this file.
+Simulates a plume, jets and a ring. For each of eight pictures, trains a solid texture and then,
+beginning with it, a rule on one frame of the plume; paints and films all three scenes with that
+rule: two of them it never saw. What is in the folder WORK already is not made again. Films go to
+`smoke/`, beside this file.
 """
 
 import sys
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from workshop import HERE, drawn, made
+from workshop import HERE, drawn, made, texture_of
 
 FILMS = HERE / "smoke"
-SCENES = {"plume": (48, 40), "jets": (48, 40), "ring": (48, 40)}
+SCENES = {"plume": (64, 40), "jets": (64, 40), "ring": (64, 40)}
 """Cells across a scene, and frames."""
 TRAINED = "plume_0030.vdb"
+TRAINING = ("--preset", "standard", "--hidden", 96, "--appearance.style-scale", 1.2)
+"""The rule is as large as the texture it begins with, and so are patterns, in cells."""
 PAINTINGS = ("vangogh_church_auvers", "vangogh_harvest")
 FILM = ("--film.rows", 200, "--film.columns", 200, "--film.fps", 12)
 
@@ -41,7 +44,8 @@ def films_of(picture: Path, work: Path) -> None:
     """Train on the plume, paint all scenes."""
     name = picture.stem
     run = work / f"smoke_{name}"
-    made(run / "model.safetensors", "train", work / "plume" / TRAINED, picture, "--out", run)
+    how = ("--begin-with", texture_of(picture, work), *TRAINING)
+    made(run / "model.safetensors", "train", work / "plume" / TRAINED, picture, "--out", run, *how)
     for scene, (_, frames) in SCENES.items():
         painted, film = work / f"{name}_{scene}", FILMS / f"{name}_{scene}.webp"
         last = painted / f"{scene}_{frames:04d}.vdb"

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import knot
-from workshop import HERE, drawn, made
+from workshop import HERE, drawn, made, texture_of
 
 from vnca.io.image import fit, read_image, write_image
 from vnca.io.mesh import read_mesh
@@ -35,8 +35,7 @@ def main(folder: str) -> None:
     meshes = {"bunny": HERE / "stanford_bunny.obj", "knot": work / "knot.obj"}
     rows = []
     for name, picture in drawn(work).items():
-        run = work / f"texture_{name}"
-        made(run / "model.safetensors", "texture", "train", picture, "--out", run)
+        run = texture_of(picture, work)
         row = [fit(read_image(picture), SIZE, SIZE)]
         for mesh, source in meshes.items():
             baked, film = work / f"{name}_{mesh}.glb", FILMS / f"{name}_{mesh}.webp"

@@ -1,4 +1,4 @@
-"""What both halves of the gallery are made with: our pictures, and the command line."""
+"""What both halves of the gallery are made with: pictures, their textures, the command line."""
 
 import sys
 from pathlib import Path
@@ -16,6 +16,13 @@ def drawn(work: Path) -> dict[str, Path]:
     if not all(file.exists() for file in files.values()):
         pictures.main(str(work))
     return files
+
+
+def texture_of(picture: Path, work: Path) -> Path:
+    """The run of a solid texture of a picture."""
+    run = work / f"texture_{picture.stem}"
+    made(run / "model.safetensors", "texture", "train", picture, "--out", run)
+    return run
 
 
 def made(target: Path, *arguments: object) -> Path:

@@ -66,24 +66,24 @@ class TrainConfig(CourseConfig):
 # gradients let patterns hold their shape.
 _ANYWHERE = RuleConfig(sobel_divisor=8, position_prior=False)
 
+# About a pixel a cell: finer views ask for detail that cells cannot have, and get grain.
+_DRAFT = TrainConfig(
+    iterations=250,
+    learning_rate=1e-3,
+    view=ViewConfig(size=96),
+    pool=PoolConfig(size=16),
+    rule=_ANYWHERE,
+    appearance=AppearanceConfig(grey=False, samples=512),
+    motion=MotionConfig(weight=0.3),
+)
+
 PRESETS = {
-    "draft": TrainConfig(
-        iterations=250,
-        learning_rate=1e-3,
-        view=ViewConfig(size=96),
-        pool=PoolConfig(size=16),
-        rule=_ANYWHERE,
-        appearance=AppearanceConfig(grey=False, samples=512),
-        motion=MotionConfig(weight=0.3),
-    ),
-    "standard": TrainConfig(
+    "draft": _DRAFT,
+    "standard": dataclasses.replace(
+        _DRAFT,
         iterations=500,
         learning_rate=1.5e-3,
-        longest_rollout=32,
-        pool=PoolConfig(size=32),
         rule=dataclasses.replace(_ANYWHERE, hidden=128),
-        appearance=AppearanceConfig(grey=False),
-        motion=MotionConfig(weight=0.3),
     ),
     "paper": TrainConfig(
         iterations=5000,
