@@ -21,7 +21,7 @@ TRAINED = "plume_0030.vdb"
 TRAINING = ("--preset", "standard", "--hidden", 96, "--appearance.style-scale", 1.2)
 """The rule is as large as the texture it begins with, and so are patterns, in cells."""
 PAINTINGS = ("vangogh_church_auvers", "vangogh_harvest")
-FILM = ("--film.rows", 200, "--film.columns", 200, "--film.fps", 12)
+FILM = ("--film.rows", 200, "--film.columns", 200, "--film.fps", 12, "--film.background", "#5a5a60")
 
 
 def main(folder: str) -> None:

@@ -66,14 +66,15 @@ class TrainConfig(CourseConfig):
 # gradients let patterns hold their shape.
 _ANYWHERE = RuleConfig(sobel_divisor=8, position_prior=False)
 
-# About a pixel a cell: finer views ask for detail that cells cannot have, and get grain.
+# About a pixel a cell, and the picture so large that cells can have its strokes: of finer detail
+# comes grain.
 _DRAFT = TrainConfig(
     iterations=250,
     learning_rate=1e-3,
     view=ViewConfig(size=96),
     pool=PoolConfig(size=16),
     rule=_ANYWHERE,
-    appearance=AppearanceConfig(grey=False, samples=512),
+    appearance=AppearanceConfig(grey=False, samples=512, style_scale=1.5),
     motion=MotionConfig(weight=0.3),
 )
 
