@@ -5,7 +5,7 @@
 Simulates a plume, jets and a ring. For each of eight pictures, trains a solid texture and then,
 beginning with it, a rule on one frame of the plume; paints and films all three scenes with that
 rule: two of them it never saw. What is in the folder WORK already is not made again. Films go to
-`smoke/`, beside this file.
+`smoke/`, beside this file, each picture with them, small.
 """
 
 import sys
@@ -14,6 +14,8 @@ from pathlib import Path
 
 from workshop import HERE, drawn, made, texture_of
 
+from vnca.io.image import fit, read_image, write_image
+
 FILMS = HERE / "smoke"
 SCENES = {"plume": (64, 40), "jets": (64, 40), "ring": (64, 40)}
 """Cells across a scene, and frames."""
@@ -21,6 +23,8 @@ TRAINED = "plume_0030.vdb"
 TRAINING = ("--preset", "standard", "--hidden", 96, "--appearance.style-scale", 1.2)
 """The rule is as large as the texture it begins with, and so are patterns, in cells."""
 PAINTINGS = ("vangogh_church_auvers", "vangogh_harvest")
+THUMBNAIL = 200
+"""Rows and columns of the picture beside its films."""
 FILM = ("--film.rows", 200, "--film.columns", 200, "--film.fps", 12, "--film.background", "#5a5a60")
 
 
@@ -43,6 +47,7 @@ def main(folder: str) -> None:
 def films_of(picture: Path, work: Path) -> None:
     """Train on the plume, paint all scenes."""
     name = picture.stem
+    write_image(FILMS / f"{name}.webp", fit(read_image(picture), THUMBNAIL, THUMBNAIL))
     run = work / f"smoke_{name}"
     how = ("--begin-with", texture_of(picture, work), *TRAINING)
     made(run / "model.safetensors", "train", work / "plume" / TRAINED, picture, "--out", run, *how)
