@@ -25,7 +25,7 @@ TRAINING = ("--preset", "standard", "--hidden", 96, "--appearance.style-scale", 
 PAINTINGS = ("vangogh_church_auvers", "vangogh_harvest")
 THUMBNAIL = 200
 """Rows and columns of the picture beside its films."""
-FILM = ("--film.rows", 200, "--film.columns", 200, "--film.fps", 12, "--film.background", "#5a5a60")
+FILM = ("--film.rows", 200, "--film.columns", 200, "--film.fps", 12, "--film.background", "#3c3c42")
 
 
 def main(folder: str) -> None:
