@@ -83,7 +83,8 @@ def test_what_a_run_was_trained_on_is_what_it_is_measured_on(
     vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
 ) -> None:
     run = tmp_path / "trained"
-    assert vnca("train", frame, style, "--out", run, *tiny, "--view.gamma", "3").code == 0
+    trained = (*tiny, "--view.gamma", "3", "--appearance.style-scale", "1")
+    assert vnca("train", frame, style, "--out", run, *trained).code == 0
     evaluated = ("evaluate", run, "--velocity-grid", "none", "--size", "112", *FEW)
     outcome = vnca(*evaluated)
     assert outcome.code == 0, outcome.err
