@@ -75,6 +75,8 @@ class Evaluate:
     def __post_init__(self) -> None:
         if self.size < 64:
             raise OptionError(f"--size {self.size}: at least 64 pixels are needed")
+        if self.style_scale is not None:
+            _checked_size(self.size * self.style_scale, f"--style-scale {self.style_scale:g}")
 
 
 def run(arguments: Sequence[str]) -> None:
@@ -101,15 +103,17 @@ def evaluate(options: Evaluate, model: Model) -> None:
     """
     folder = options.run if options.run.is_dir() else options.run.parent
     out = writable_folder(options.out or folder / "evaluation")
-    picture = _picture(options, model, folder)
+    picture, scale = _picture(options, model, folder), options.style_scale
     sequence = open_sequence(_sequence(options, folder), options.frames)
+    cells = 0.0 if scale else _shown_cells(options, model)
     smoke = with_fitted_scale(options.smoke, sequence)
     box = sequence_box(sequence, smoke)
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.
     shapes = volumes(sequence, dataclasses.replace(smoke, velocity_grid=NO_VELOCITY))
     refine = options.refine
     stage = Stage.around(shapes, model.rule, options.size).refined(refine)
-    gauge = StyleGauge(picture, _shorter(options, model, stage))
+    wide = options.size * scale if scale else cells * stage.scale
+    gauge = StyleGauge(picture, _checked_size(wide, f"--size {options.size}"))
     paintings = stylize(
         volumes(sequence, smoke),
         model.rule,
@@ -168,25 +172,24 @@ def _picture(options: Evaluate, model: Model, folder: Path) -> FloatArray:
         return read_image(path)
 
 
-def _shorter(options: Evaluate, model: Model, stage: Stage) -> int:
-    """The picture's shorter side where it is compared, pixels."""
+def _shown_cells(options: Evaluate, model: Model) -> float:
+    """How many cells wide the rule was shown its picture, the shorter side."""
     recorded = model.training.get(PICTURE_CELLS)
-    if options.style_scale is not None:
-        option = f"--style-scale {options.style_scale:g}"
-        shorter = options.size * options.style_scale
-    elif isinstance(recorded, (int, float)):
-        option = f"--size {options.size}"
-        shorter = recorded * stage.scale
-    else:
+    if not isinstance(recorded, (int, float)):
         raise OptionError(
             f"{options.run}: does not tell how many cells wide its picture was; set --style-scale"
         )
-    if not SMALLEST <= shorter <= LARGEST_PICTURE:
+    return recorded
+
+
+def _checked_size(pixels: float, option: str) -> int:
+    """The picture's shorter side where it is compared."""
+    if not SMALLEST <= pixels <= LARGEST_PICTURE:
         raise OptionError(
-            f"{option}: makes the picture {shorter:.0f} pixels wide, of {SMALLEST} to "
+            f"{option}: makes the picture {pixels:.0f} pixels wide, of {SMALLEST} to "
             f"{LARGEST_PICTURE}"
         )
-    return round(shorter)
+    return round(pixels)
 
 
 def _sequence(options: Evaluate, folder: Path) -> str:

@@ -36,7 +36,7 @@ from vnca.texturing.config import TextureConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.memory import memory_budget
-from vnca.training.smoke import choose_scales, smoke_trainer
+from vnca.training.smoke import smoke_trainer
 from vnca.training.smoke_scene import smoke_bounds, view_width
 
 COMMAND = "train"
@@ -120,7 +120,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
     with fitting(config, "this frame"):
         budget = memory_budget(options.memory_budget)
         trainer = smoke_trainer(smoke, style, config, vgg, device=device, memory_budget=budget)
-    width = view_width(smoke_bounds(smoke, choose_scales(smoke, config).density))
+    width = view_width(smoke_bounds(smoke, trainer.rule().scales.density))
     training = {
         "frame": options.frame.name,
         "style": options.style.name,

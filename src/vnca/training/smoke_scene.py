@@ -1,6 +1,7 @@
 """The one frame a rule is trained on, ready for rollouts and pictures."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -109,7 +110,7 @@ class SmokeScene(Scene[SmokeSight]):
         azimuths = self.view.azimuths
         azimuth = float(random.choice(azimuths)) if azimuths else random.uniform(0, 360)
         elevation = random.uniform(-self.view.elevation, self.view.elevation)
-        camera = turntable(*self._corners, azimuth, elevation, steepest=0)
+        camera = _level_turntable(*self._corners, azimuth, elevation)
         # Samples at random depths: no pattern can hide between them.
         offset = float(random.uniform()) if self.view.mode == "sane" else 0.0
         return SmokeSight(camera, offset)
@@ -177,11 +178,15 @@ class SmokeScene(Scene[SmokeSight]):
 
 
 def view_width(box: Box) -> float:
-    """Cells across a view of training, the same from all sides: patterns keep their size.
+    """Cells across a view of training, the same from all sides: patterns keep their size."""
+    return _level_turntable(box.lower, box.upper).height
 
-    Views from above or below may cut off corners of the box that holds the smoke.
-    """
-    return turntable(box.lower, box.upper, steepest=0).height
+
+def _level_turntable(
+    lower: Sequence[float], upper: Sequence[float], azimuth: float = 0.0, elevation: float = 0.0
+) -> Orthographic:
+    """As near as level views allow: those from above or below may cut off corners of the box."""
+    return turntable(lower, upper, azimuth, elevation, steepest=0)
 
 
 def smoke_bounds(smoke: Volume, density_scale: float) -> Box:
