@@ -25,19 +25,24 @@ class Density(Study):
     domain: DomainKind | None = None
     """Where cells live: within reach of the smoke (active), whose surface tells them where it is,
     or in all of its box as in the paper; as the preset has it unless given."""
+    velocity: bool = True
+    """Whether cells are told the velocity, by which they can tell where smoke is, too."""
 
     @property
     def config(self) -> TrainConfig:
         """That of the reference."""
         config = super().config
-        return replace(config, rule=replace(config.rule, domain=self.domain or config.rule.domain))
+        domain = self.domain or config.rule.domain
+        return replace(
+            config, rule=replace(config.rule, domain=domain, velocity_prior=self.velocity)
+        )
 
 
 def compare(study: Density) -> None:
     smoke, config, judge = study.volume, study.config, Judge(study)
     rule_config = replace(config.rule, density_prior=False)
     kinds = {"with": config, "without": replace(config, rule=rule_config)}
-    where = f"cells in {DOMAINS[config.rule.domain]}"
+    where = f"cells in {DOMAINS[config.rule.domain]}" + " told no velocity" * (not study.velocity)
     findings, pictures = Findings(study, "density"), {}
     reference = study.trained(REFERENCE, config, study.seeds[0])
     white = paint(reference, smoke, UNPAINTED)
@@ -51,7 +56,8 @@ def compare(study: Density) -> None:
             if seed == study.seeds[0]:
                 pictures[f"{kind} density"] = judge.sides(painting, rule)
     findings.tell()
-    study.picture(f"density_{config.rule.domain}", judge.sheet(pictures))
+    name = f"density_{config.rule.domain}" + "_without_velocity" * (not study.velocity)
+    study.picture(name, judge.sheet(pictures))
 
 
 if __name__ == "__main__":

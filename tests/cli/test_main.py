@@ -31,9 +31,10 @@ def test_every_command_explains_itself(vnca: Vnca, command: str) -> None:
     assert not outcome.err
 
 
-def test_a_reader_that_goes_away_is_no_error(frame: Path) -> None:
+@pytest.mark.parametrize("arguments", ["info {}", "--help", "info --help"])
+def test_a_reader_that_goes_away_is_no_error(arguments: str, frame: Path) -> None:
     code = "import sys; from vnca.cli import main; sys.exit(main(sys.argv[1:]))"
-    command = [sys.executable, "-c", code, "info", str(frame)]
+    command = [sys.executable, "-c", code, *arguments.format(frame).split()]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as program:
         assert program.stdout is not None
         program.stdout.close()

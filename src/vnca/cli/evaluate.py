@@ -36,7 +36,7 @@ from vnca.typing import FloatArray
 
 REPORT_NAME = "report.html"
 MEASURES_NAME = "report.json"
-LARGEST_PICTURE = 4096
+LARGEST = 4096
 """Pixels along the shorter side of the picture."""
 
 
@@ -184,10 +184,9 @@ def _shown_cells(options: Evaluate, model: Model) -> float:
 
 def _checked_size(pixels: float, option: str) -> int:
     """The picture's shorter side where it is compared."""
-    if not SMALLEST <= pixels <= LARGEST_PICTURE:
+    if not SMALLEST <= pixels <= LARGEST:
         raise OptionError(
-            f"{option}: makes the picture {pixels:.0f} pixels wide, of {SMALLEST} to "
-            f"{LARGEST_PICTURE}"
+            f"{option}: makes the picture {pixels:.0f} pixels wide, of {SMALLEST} to {LARGEST}"
         )
     return round(pixels)
 

@@ -16,7 +16,7 @@ from vnca.stylize.roll import stylize
 from vnca.typing import Box, FloatArray
 from vnca.volume import Volume
 
-FEWEST_PIXELS = 64
+FEWEST_OPAQUE = 64
 """Opaque pixels without which a view says nothing about style."""
 CUTOUTS = 3
 """Cut-outs of the picture for each view."""
@@ -98,7 +98,7 @@ def likeness(gauge: StyleGauge, pairs: Sequence[Pair]) -> Likeness | None:
 
     None where it is opaque in none of them.
     """
-    pairs = [pair for pair in pairs if pair.where.sum() >= FEWEST_PIXELS]
+    pairs = [pair for pair in pairs if pair.where.sum() >= FEWEST_OPAQUE]
     if not pairs:
         return None
     return Likeness(
