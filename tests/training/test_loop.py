@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -7,10 +8,12 @@ import torch
 
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import Appearance, AppearanceLoss
+from vnca.losses.motion import MotionConfig
 from vnca.training.config import TrainConfig
 from vnca.training.course import PoolConfig
 from vnca.training.loop import Trainer
 from vnca.training.preview import preview_sheet
+from vnca.training.scene import Scene
 from vnca.training.smoke import smoke_trainer
 from vnca.typing import FloatArray
 from vnca.volume import Volume
@@ -128,9 +131,9 @@ def test_states_live_on_from_iteration_to_iteration(trainer: Make) -> None:
     starts: list[bool] = []
     roll = training._roll
 
-    def look(state: torch.Tensor, steps: range) -> torch.Tensor:
+    def look(state: torch.Tensor, steps: range, scene: Scene[Any]) -> torch.Tensor:
         starts.append(bool(state.any()))
-        return roll(state, steps)
+        return roll(state, steps, scene)
 
     training._roll = look  # type: ignore[method-assign,assignment]
     list(training.run())
@@ -143,14 +146,22 @@ def test_no_two_rollouts_share_a_mask(trainer: Make) -> None:
     numbers: list[int] = []
     roll = training._roll
 
-    def look(state: torch.Tensor, steps: range) -> torch.Tensor:
+    def look(state: torch.Tensor, steps: range, scene: Scene[Any]) -> torch.Tensor:
         numbers.extend(steps)
-        return roll(state, steps)
+        return roll(state, steps, scene)
 
     training._roll = look  # type: ignore[method-assign,assignment]
     list(training.run())
     assert numbers == list(range(len(numbers)))
     assert 5 * 2 <= len(numbers) <= 5 * 4
+
+
+def test_winds_change_what_is_learned(trainer: Make) -> None:
+    moved = MotionConfig(weight=1.0)
+    still, turned = (trainer(iterations=6, motion=moved, winds=winds) for winds in (False, True))
+    for training in (still, turned):
+        list(training.run())
+    assert not same(still, turned)
 
 
 def test_terms_are_told_and_add_up(trainer: Make) -> None:

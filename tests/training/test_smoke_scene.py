@@ -9,7 +9,13 @@ from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import GridError
 from vnca.training.config import TrainConfig, ViewConfig
 from vnca.training.smoke import choose_scales
-from vnca.training.smoke_scene import SmokeScene, density_scale, smoke_bounds, velocity_scale
+from vnca.training.smoke_scene import (
+    SPEEDS,
+    SmokeScene,
+    density_scale,
+    smoke_bounds,
+    velocity_scale,
+)
 from vnca.typing import Box
 from vnca.volume import Volume
 
@@ -126,3 +132,28 @@ def test_a_look_is_differentiable_in_what_is_shown_only(tiny_smoke: Volume) -> N
     moved = state.grad.abs().sum(0)
     assert bool((moved[:4] > 0).all())
     assert not moved[4:].any()
+
+
+def test_a_wind_turns_all_of_the_velocity_alike_and_nothing_else(tiny_smoke: Volume) -> None:
+    rule = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(velocity=2.0), seed=0)
+    calm = SmokeScene(tiny_smoke, rule, ViewConfig(size=32))
+    windy = SmokeScene(tiny_smoke, rule, ViewConfig(size=32), winds=True)
+    assert calm.variant(3) is calm
+    before = windy.velocity.clone(), windy.priors.clone()
+    blown, other = windy.variant(3), windy.variant(4)
+    speed, speeds = (np.linalg.norm(s.velocity.numpy(), axis=1) for s in (windy, blown))
+    factors = speeds[speed > 0] / speed[speed > 0]
+    np.testing.assert_allclose(factors, factors[0], rtol=1e-4)
+    assert SPEEDS[0] <= factors[0] <= SPEEDS[1]
+    torch.testing.assert_close(blown.priors[:, 4:], blown.velocity / 2)
+    torch.testing.assert_close(blown.priors[:, :4], windy.priors[:, :4], rtol=0, atol=0)
+    torch.testing.assert_close(windy.variant(3).velocity, blown.velocity, rtol=0, atol=0)
+    assert not torch.allclose(other.velocity, blown.velocity)
+    assert torch.equal(windy.velocity, before[0])
+    assert torch.equal(windy.priors, before[1])
+
+
+def test_no_wind_blows_where_nothing_moves(tiny_smoke: Volume) -> None:
+    rule = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(), seed=0)
+    still = SmokeScene(replace(tiny_smoke, velocity=None), rule, ViewConfig(size=32), winds=True)
+    assert still.variant(3) is still

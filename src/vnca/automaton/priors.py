@@ -10,6 +10,8 @@ from vnca.automaton.rule import PRIORS, Rule
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
+VELOCITY = slice(4, 7)
+"""The priors of a cell that are the velocity."""
 VELOCITY_LIMIT = 4.0
 """Normalised velocity is clamped here: a file in other units must not blow a state up."""
 DENSITY_LIMIT = 4.0
@@ -33,5 +35,5 @@ def priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
         values[:, 3] = np.minimum(density / scales.density, DENSITY_LIMIT)
     if config.velocity_prior and smoke.velocity is not None:
         velocity = domain.gather(smoke.velocity, smoke.origin) / scales.velocity
-        values[:, 4:7] = np.clip(velocity, -VELOCITY_LIMIT, VELOCITY_LIMIT)
+        values[:, VELOCITY] = np.clip(velocity, -VELOCITY_LIMIT, VELOCITY_LIMIT)
     return values

@@ -55,6 +55,9 @@ class TrainConfig(CourseConfig):
 
     motion: MotionConfig = field(default_factory=MotionConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
+    winds: bool = False
+    """Turn and slow the smoke's velocity in another way for each state of the pool, so that the
+    rule learns from one frame to paint smoke that moves otherwise."""
 
     @property
     def pictures(self) -> Pictures:
@@ -76,6 +79,7 @@ _DRAFT = TrainConfig(
     rule=_ANYWHERE,
     appearance=AppearanceConfig(grey=False, samples=512, style_scale=1.5),
     motion=MotionConfig(weight=0.3),
+    winds=True,
 )
 
 PRESETS = {

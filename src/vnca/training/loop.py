@@ -6,6 +6,7 @@ Reference: VNCA sections 3.4 and 5.
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -220,14 +221,16 @@ class Trainer:
         config = self.config
         place, before = self._pool.draw(self.iteration)
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
-        state = self._roll(before, range(self._steps, self._steps + steps))
+        scene = self.scene.variant(place)
+        state = self._roll(before, range(self._steps, self._steps + steps), scene)
         self._steps += steps
-        sight = self.scene.sight(self._random)
-        pictures, opacity = self.scene.pictures(state, sight, self.background)
+        sight = scene.sight(self._random)
+        pictures, opacity = scene.pictures(state, sight, self.background)
         appearance = self._appearance(pictures, opacity, self._generator)
         others = {"overflow": config.overflow * self._overflow(state[:-1])}
         if self._motion is not None and before.any():  # a state of zeros has no texture to move
             others["motion"] = self._motion.loss(
+                place,
                 before,
                 pictures,
                 sight,
@@ -251,15 +254,17 @@ class Trainer:
     def grow(self, steps: int) -> Tensor:
         """A state grown from the seed, as painting does; no random stream moves."""
         with torch.no_grad():
-            return self._roll(self.scene.seed(self.config.rule.channels), range(steps))
+            seed = self.scene.seed(self.config.rule.channels)
+            return self._roll(seed, range(steps), self.scene)
 
-    def _roll(self, state: Tensor, steps: range) -> Tensor:
+    def _roll(self, state: Tensor, steps: range, scene: Scene[Any]) -> Tensor:
         """The state after the numbered steps of the rule; differentiable in the weights."""
-        return roll_out(self._advance, state, steps, kept_states=self.kept_states)
+        advance = partial(self._advance, scene)
+        return roll_out(advance, state, steps, kept_states=self.kept_states)
 
-    def _advance(self, state: Tensor, step: int) -> Tensor:
+    def _advance(self, scene: Scene[Any], state: Tensor, step: int) -> Tensor:
         rows = changing_rows(
-            self.scene.domain.hashes,
+            scene.domain.hashes,
             seed=self.config.seed,
             step=step,
             probability=self.config.rule.update_probability,
@@ -267,8 +272,8 @@ class Trainer:
         return self.step(
             state,
             torch.from_numpy(rows).to(state.device),
-            self.scene.neighbours,
-            self.scene.priors,
+            scene.neighbours,
+            scene.priors,
             self._weights,
             self._stencil,
         )

@@ -37,6 +37,7 @@ class MotionSupervision:
 
     def loss(
         self,
+        place: int,
         before: Tensor,
         after: Tensor,
         sight: SmokeSight,
@@ -48,6 +49,7 @@ class MotionSupervision:
         """How the texture moved in a rollout, against how the smoke moves in that time, weighted.
 
         Args:
+            place: That of the state in the pool; in its variant of the scene the rollout was.
             before: The state at its start, `[n + 1, C]`.
             after: The picture of its end, sRGB `[1, 3, r, c]`; differentiable.
             sight: Where the picture was taken from.
@@ -55,10 +57,11 @@ class MotionSupervision:
             frames: Frames that pass in the rollout, n / N.
             appearance: The appearance loss of this iteration.
         """
+        scene = self._scene.variant(place)
         with torch.no_grad():
-            earlier, _ = self._scene.pictures(before, sight, background)
+            earlier, _ = scene.pictures(before, sight, background)
         size = min(self.config.size, after.shape[-1])
-        target, opacity = self._scene.motion(before, sight, size)
+        target, opacity = scene.motion(before, sight, size)
         motion = self.compare(earlier, after, target, opacity, frames=frames)
         return self.weighted(motion, appearance)
 

@@ -46,6 +46,11 @@ class Scene(ABC, Generic[Sight]):
         field = values.new_zeros(int(np.prod(shape)), *values.shape[1:])
         return field.index_copy(0, self._places, values).view(*shape, *values.shape[1:])
 
+    def variant(self, place: int) -> "Scene[Sight]":
+        """The scene that the state at a place of the pool lives in, always the same cells."""
+        del place
+        return self
+
     @abstractmethod
     def sight(self, random: np.random.Generator) -> Sight:
         """Where to look from in an iteration, drawn at random."""

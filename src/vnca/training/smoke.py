@@ -38,7 +38,7 @@ def smoke_trainer(
         OptionError: If the memory budget is not enough.
     """
     rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
-    scene = SmokeScene(smoke, rule, config.view, device=device)
+    scene = SmokeScene(smoke, rule, config.view, winds=config.winds, device=device)
     motion = None
     if config.motion.weight and scene.moves:
         motion = MotionSupervision(config.motion, FlowNetwork.load(device), scene)

@@ -1,15 +1,17 @@
 """The one frame a rule is trained on, ready for rollouts and pictures."""
 
+import copy
 import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import torch
+from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from vnca.automaton.domain import Domain
-from vnca.automaton.priors import priors
+from vnca.automaton.priors import VELOCITY, priors
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
 from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable
 from vnca.errors import GridError
@@ -21,6 +23,8 @@ from vnca.training.scene import Scene
 from vnca.typing import AnyArray, Box, FloatArray
 from vnca.volume import Volume
 
+SPEEDS = (0.25, 1.5)
+"""How much slower or faster than in the frame smoke moves in a wind, at most."""
 PORTRAITS = ((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (30.0, 60.0))
 """Azimuth and elevation: front, right, back and from above, degrees."""
 PORTRAIT_STEP = 0.5
@@ -46,6 +50,7 @@ class SmokeScene(Scene[SmokeSight]):
 
     Attributes:
         view: How it is looked at.
+        winds: Whether its velocity is another in each variant.
         box: The cells that hold smoke lie in it.
         velocity: `[n, 3]`, cells per frame.
         moves: Whether the smoke has any.
@@ -57,6 +62,7 @@ class SmokeScene(Scene[SmokeSight]):
         rule: Rule,
         view: ViewConfig,
         *,
+        winds: bool = False,
         device: torch.device | str = "cpu",
     ) -> None:
         """Prepare a frame.
@@ -65,12 +71,14 @@ class SmokeScene(Scene[SmokeSight]):
             smoke: The frame; must hold smoke.
             rule: Its normalisers and switches are used, not its weights.
             view: How it is looked at; gamma is the rule's.
+            winds: Whether its velocity is another in each variant.
             device: Where rollouts and pictures are computed.
 
         Raises:
             GridError: If there is no smoke in the frame.
         """
         self.view = view
+        self.winds = winds
         self.box = smoke_bounds(smoke, rule.scales.density)
         box = self.box.grown(rule.config.reach)
         if rule.config.domain == "box":
@@ -93,6 +101,22 @@ class SmokeScene(Scene[SmokeSight]):
             velocity[:] = domain.gather(smoke.velocity, smoke.origin)
         self.moves = bool(velocity.any())
         self.velocity = torch.from_numpy(velocity).to(device)
+
+    def variant(self, place: int) -> "SmokeScene":
+        """The smoke in the wind of a place: its velocity turned at random, and slower or faster.
+
+        The rule is told the turned velocity, and motion is judged by it.
+        """
+        if not (self.winds and self.moves):
+            return self
+        random = np.random.default_rng(place)
+        turn = Rotation.from_quat(random.standard_normal(4)).as_matrix() * random.uniform(*SPEEDS)
+        turned = torch.from_numpy(turn.T.astype(np.float32)).to(self.velocity.device)
+        scene = copy.copy(self)
+        scene.velocity = self.velocity @ turned
+        scene.priors = self.priors.clone()
+        scene.priors[:, VELOCITY] = self.priors[:, VELOCITY] @ turned
+        return scene
 
     def camera(
         self, azimuth: float, elevation: float, *, aspect: float = 1.0
