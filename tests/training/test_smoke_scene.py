@@ -140,7 +140,8 @@ def test_a_wind_turns_all_of_the_velocity_alike_and_nothing_else(tiny_smoke: Vol
     windy = SmokeScene(tiny_smoke, rule, ViewConfig(size=32), winds=True)
     assert calm.variant(3) is calm
     before = windy.velocity.clone(), windy.priors.clone()
-    blown, other = windy.variant(3), windy.variant(4)
+    assert windy.variant(4) is windy
+    blown, other = windy.variant(3), windy.variant(5)
     speed, speeds = (np.linalg.norm(s.velocity.numpy(), axis=1) for s in (windy, blown))
     factors = speeds[speed > 0] / speed[speed > 0]
     np.testing.assert_allclose(factors, factors[0], rtol=1e-4)

@@ -56,7 +56,7 @@ class TrainConfig(CourseConfig):
     motion: MotionConfig = field(default_factory=MotionConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     winds: bool = False
-    """Turn and slow the smoke's velocity in another way for each state of the pool, so that the
+    """Turn and slow the smoke's velocity for half of the pool's states, each in its own way: the
     rule learns from one frame to paint smoke that moves otherwise."""
 
     @property
