@@ -20,7 +20,10 @@ FILMS = HERE / "smoke"
 SCENES = {"plume": (64, 40), "jets": (64, 40), "ring": (64, 40)}
 """Cells across a scene, and frames."""
 TRAINED = "plume_0030.vdb"
-TRAINING = ("--preset", "standard", "--hidden", 96, "--appearance.style-scale", 1.2)
+TRAINING = (
+    *("--preset", "standard", "--iterations", 500, "--no-winds"),
+    *("--hidden", 96, "--appearance.style-scale", 1.2),
+)
 """The rule is as large as the texture it begins with, and so are patterns, in cells."""
 PAINTINGS = ("vangogh_church_auvers", "vangogh_harvest")
 THUMBNAIL = 200

@@ -11,7 +11,7 @@ from vnca.automaton.rule import PRIORS, Rule
 from vnca.texturing.config import PRESETS, TextureConfig
 from vnca.training.config import TrainConfig
 
-SHARES = {"draft": 4.0, "standard": 2.0, "paper": 0.0}
+SHARES = {"draft": 4.0, "standard": 1.0, "paper": 0.0}
 """Iterations on the texture for each on smoke, by preset."""
 SHAPE = ("channels", "hidden", "update_probability", "sobel_divisor", "laplacian_divisor")
 """In what a rule must be like the texture that it begins with."""

@@ -86,7 +86,7 @@ PRESETS = {
     "draft": _DRAFT,
     "standard": dataclasses.replace(
         _DRAFT,
-        iterations=500,
+        iterations=1000,
         learning_rate=1.5e-3,
         rule=dataclasses.replace(_ANYWHERE, hidden=128),
     ),
