@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from vnca.texturing.training import texture_trainer
 from vnca.training.course import PoolConfig
 from vnca.training.loop import Trainer
 from vnca.training.preview import preview_sheet
+from vnca.training.scene import Scene
 from vnca.typing import FloatArray
 
 Make = Callable[..., Trainer]
@@ -97,9 +99,9 @@ def test_states_live_on_from_iteration_to_iteration(trainer: Make) -> None:
     starts: list[bool] = []
     roll = training._roll
 
-    def look(state: torch.Tensor, steps: range) -> torch.Tensor:
+    def look(state: torch.Tensor, steps: range, scene: Scene[Any]) -> torch.Tensor:
         starts.append(bool(state.any()))
-        return roll(state, steps)
+        return roll(state, steps, scene)
 
     training._roll = look  # type: ignore[method-assign,assignment]
     list(training.run())
