@@ -10,8 +10,8 @@ from vnca.automaton.rule import PRIORS, Rule
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
-VELOCITY = slice(4, 7)
-"""The priors of a cell that are the velocity."""
+DENSITY, VELOCITY = slice(3, 4), slice(4, 7)
+"""Which priors of a cell are the density and the velocity."""
 VELOCITY_LIMIT = 4.0
 """Normalised velocity is clamped here: a file in other units must not blow a state up."""
 DENSITY_LIMIT = 4.0

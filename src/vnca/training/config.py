@@ -56,8 +56,8 @@ class TrainConfig(CourseConfig):
     motion: MotionConfig = field(default_factory=MotionConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     winds: bool = False
-    """Turn and slow the smoke's velocity for half of the pool's states, each in its own way: the
-    rule learns from one frame to paint smoke that moves otherwise."""
+    """Tell each state of the pool another speed and density of the smoke, and turn the velocity for
+    every other: the rule learns from one frame to paint smoke that moves otherwise."""
 
     @property
     def pictures(self) -> Pictures:

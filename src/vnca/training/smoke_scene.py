@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from vnca.automaton.domain import Domain
-from vnca.automaton.priors import VELOCITY, priors
+from vnca.automaton.priors import DENSITY, VELOCITY, priors
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
 from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable
 from vnca.errors import GridError
@@ -25,6 +25,8 @@ from vnca.volume import Volume
 
 SPEEDS = (0.25, 1.5)
 """How much slower or faster than in the frame smoke moves in a wind, at most."""
+DENSEST = 2.0
+"""How much denser, or thinner, than it is the rule is told that it is, at most."""
 PORTRAITS = ((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (30.0, 60.0))
 """Azimuth and elevation: front, right, back and from above, degrees."""
 PORTRAIT_STEP = 0.5
@@ -50,7 +52,7 @@ class SmokeScene(Scene[SmokeSight]):
 
     Attributes:
         view: How it is looked at.
-        winds: Whether its velocity is another in each variant.
+        winds: Whether its velocity, and the density told, are others in each variant.
         box: The cells that hold smoke lie in it.
         velocity: `[n, 3]`, cells per frame.
         moves: Whether the smoke has any.
@@ -71,7 +73,7 @@ class SmokeScene(Scene[SmokeSight]):
             smoke: The frame; must hold smoke.
             rule: Its normalisers and switches are used, not its weights.
             view: How it is looked at; gamma is the rule's.
-            winds: Whether its velocity is another in each variant.
+            winds: Whether its velocity, and the density told, are others in each variant.
             device: Where rollouts and pictures are computed.
 
         Raises:
@@ -103,19 +105,22 @@ class SmokeScene(Scene[SmokeSight]):
         self.velocity = torch.from_numpy(velocity).to(device)
 
     def variant(self, place: int) -> "SmokeScene":
-        """The smoke in the wind of a place: its velocity turned at random, and slower or faster.
+        """The smoke in the wind of a place: faster or slower, and told to be denser or thinner.
 
-        The rule is told the turned velocity, and motion is judged by it. Even places are calm.
+        At odd places its velocity is turned at random, too. The rule is told the velocity of the
+        wind, and motion is judged by it; the density that is seen stays as it is.
         """
-        if not (self.winds and self.moves) or place % 2 == 0:
+        if not (self.winds and self.moves):
             return self
         random = np.random.default_rng(place)
-        turn = Rotation.from_quat(random.standard_normal(4)).as_matrix() * random.uniform(*SPEEDS)
+        turn = Rotation.from_quat(random.standard_normal(4)).as_matrix()
+        turn = (turn if place % 2 else np.eye(3)) * random.uniform(*SPEEDS)
         turned = torch.from_numpy(turn.T.astype(np.float32)).to(self.velocity.device)
         scene = copy.copy(self)
         scene.velocity = self.velocity @ turned
         scene.priors = self.priors.clone()
         scene.priors[:, VELOCITY] = self.priors[:, VELOCITY] @ turned
+        scene.priors[:, DENSITY] *= DENSEST ** random.uniform(-1, 1)
         return scene
 
     def camera(
