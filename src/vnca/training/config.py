@@ -79,7 +79,6 @@ _DRAFT = TrainConfig(
     rule=_ANYWHERE,
     appearance=AppearanceConfig(grey=False, samples=512, style_scale=1.5),
     motion=MotionConfig(weight=0.3),
-    winds=True,
 )
 
 PRESETS = {
@@ -89,6 +88,7 @@ PRESETS = {
         iterations=1000,
         learning_rate=1.5e-3,
         rule=dataclasses.replace(_ANYWHERE, hidden=128),
+        winds=True,
     ),
     "paper": TrainConfig(
         iterations=5000,
