@@ -42,7 +42,9 @@ def compare(study: Density) -> None:
     smoke, config, judge = study.volume, study.config, Judge(study)
     rule_config = replace(config.rule, density_prior=False)
     kinds = {"with": config, "without": replace(config, rule=rule_config)}
-    where = f"cells in {DOMAINS[config.rule.domain]}" + " told no velocity" * (not study.velocity)
+    where, name = f"cells in {DOMAINS[config.rule.domain]}", f"density_{config.rule.domain}"
+    if not study.velocity:
+        where, name = f"{where} told no velocity", f"{name}_without_velocity"
     findings, pictures = Findings(study, "density"), {}
     reference = study.trained(REFERENCE, config, study.seeds[0])
     white = paint(reference, smoke, UNPAINTED)
@@ -56,7 +58,6 @@ def compare(study: Density) -> None:
             if seed == study.seeds[0]:
                 pictures[f"{kind} density"] = judge.sides(painting, rule)
     findings.tell()
-    name = f"density_{config.rule.domain}" + "_without_velocity" * (not study.velocity)
     study.picture(name, judge.sheet(pictures))
 
 

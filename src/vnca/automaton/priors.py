@@ -32,7 +32,7 @@ def priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
         values[:, 0:3] = (2 * at + 1) / shape - 1
     if config.density_prior:
         density = domain.gather(smoke.density, smoke.origin)
-        values[:, 3] = np.minimum(density / scales.density, DENSITY_LIMIT)
+        values[:, DENSITY] = np.minimum(density / scales.density, DENSITY_LIMIT)[:, None]
     if config.velocity_prior and smoke.velocity is not None:
         velocity = domain.gather(smoke.velocity, smoke.origin) / scales.velocity
         values[:, VELOCITY] = np.clip(velocity, -VELOCITY_LIMIT, VELOCITY_LIMIT)

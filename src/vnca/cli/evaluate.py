@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -103,17 +103,15 @@ def evaluate(options: Evaluate, model: Model) -> None:
     """
     folder = options.run if options.run.is_dir() else options.run.parent
     out = writable_folder(options.out or folder / "evaluation")
-    picture, scale = _picture(options, model, folder), options.style_scale
+    picture, width = _picture(options, model, folder), _compared_width(options, model)
     sequence = open_sequence(_sequence(options, folder), options.frames)
-    cells = 0.0 if scale else _shown_cells(options, model)
     smoke = with_fitted_scale(options.smoke, sequence)
     box = sequence_box(sequence, smoke)
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.
     shapes = volumes(sequence, dataclasses.replace(smoke, velocity_grid=NO_VELOCITY))
     refine = options.refine
     stage = Stage.around(shapes, model.rule, options.size).refined(refine)
-    wide = options.size * scale if scale else cells * stage.scale
-    gauge = StyleGauge(picture, _checked_size(wide, f"--size {options.size}"))
+    gauge = StyleGauge(picture, _checked_size(width(stage), f"--size {options.size}"))
     paintings = stylize(
         volumes(sequence, smoke),
         model.rule,
@@ -172,14 +170,17 @@ def _picture(options: Evaluate, model: Model, folder: Path) -> FloatArray:
         return read_image(path)
 
 
-def _shown_cells(options: Evaluate, model: Model) -> float:
-    """How many cells wide the rule was shown its picture, the shorter side."""
-    recorded = model.training.get(PICTURE_CELLS)
-    if not isinstance(recorded, (int, float)):
+def _compared_width(options: Evaluate, model: Model) -> Callable[[Stage], float]:
+    """Pixels along the picture's shorter side on a stage: as many cells as the rule was shown."""
+    if options.style_scale is not None:
+        pixels = options.size * options.style_scale
+        return lambda _: pixels
+    cells = model.training.get(PICTURE_CELLS)
+    if not isinstance(cells, (int, float)):
         raise OptionError(
             f"{options.run}: does not tell how many cells wide its picture was; set --style-scale"
         )
-    return recorded
+    return lambda stage: cells * stage.scale
 
 
 def _checked_size(pixels: float, option: str) -> int:
