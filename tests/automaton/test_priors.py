@@ -4,7 +4,7 @@ import numpy as np
 
 from vnca.automaton.domain import Domain
 from vnca.automaton.paint import colours, density_factors
-from vnca.automaton.priors import priors
+from vnca.automaton.priors import priors, told_velocity
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.colour import linear_to_srgb
 from vnca.volume import Volume
@@ -80,6 +80,14 @@ def test_a_density_in_other_units_cannot_blow_a_state_up() -> None:
     huge = dataclasses.replace(volume, density=volume.density * 1e6)
     domain = Domain.from_mask(np.ones(SHAPE, bool), volume.origin)
     assert np.abs(priors(domain, huge, rule())).max() <= 4
+
+
+def test_fast_smoke_is_told_where_it_goes_and_no_speed_beyond_the_limit() -> None:
+    velocity = np.array([[0, 0, 0], [3, 0, 0], [0, -4, 0], [30, 0, -40], [3e9, 4e9, 0]], np.float32)
+    told = told_velocity(velocity, rule())
+    expected = [[0, 0, 0], [1.5, 0, 0], [0, -2, 0], [1.2, 0, -1.6], [1.2, 1.6, 0]]
+    np.testing.assert_allclose(told, expected, rtol=1e-6)
+    assert told.dtype == np.float32
 
 
 def test_the_seed_shows_middle_grey_and_leaves_density_alone() -> None:

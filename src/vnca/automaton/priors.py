@@ -12,8 +12,9 @@ from vnca.volume import Volume
 
 DENSITY, VELOCITY = slice(3, 4), slice(4, 7)
 """Which priors of a cell are the density and the velocity."""
-VELOCITY_LIMIT = 4.0
-"""Normalised velocity is clamped here: a file in other units must not blow a state up."""
+SPEED_LIMIT = 2.0
+"""Cells are told no normalised speed above this: training has hardly met faster smoke, and what a
+rule has not met it paints badly. Nor must a file in other units blow a state up."""
 DENSITY_LIMIT = 4.0
 """Likewise for density."""
 
@@ -33,7 +34,18 @@ def priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
     if config.density_prior:
         density = domain.gather(smoke.density, smoke.origin)
         values[:, DENSITY] = np.minimum(density / scales.density, DENSITY_LIMIT)[:, None]
-    if config.velocity_prior and smoke.velocity is not None:
-        velocity = domain.gather(smoke.velocity, smoke.origin) / scales.velocity
-        values[:, VELOCITY] = np.clip(velocity, -VELOCITY_LIMIT, VELOCITY_LIMIT)
+    if smoke.velocity is not None:
+        values[:, VELOCITY] = told_velocity(domain.gather(smoke.velocity, smoke.origin), rule)
     return values
+
+
+def told_velocity(velocity: FloatArray, rule: Rule) -> FloatArray:
+    """What cells are told of a velocity `[n, 3]`, cells per frame: its direction, limited in speed.
+
+    Zero if the rule switches it off.
+    """
+    if not rule.config.velocity_prior:
+        return np.zeros_like(velocity)
+    told = velocity / rule.scales.velocity
+    speed = np.linalg.norm(told, axis=-1, keepdims=True)
+    return told * (SPEED_LIMIT / np.maximum(speed, SPEED_LIMIT))

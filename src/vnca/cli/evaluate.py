@@ -103,8 +103,9 @@ def evaluate(options: Evaluate, model: Model) -> None:
     """
     folder = options.run if options.run.is_dir() else options.run.parent
     out = writable_folder(options.out or folder / "evaluation")
-    picture, width = _picture(options, model, folder), _compared_width(options, model)
+    picture = _picture(options, model, folder)
     sequence = open_sequence(_sequence(options, folder), options.frames)
+    width = _compared_width(options, model)
     smoke = with_fitted_scale(options.smoke, sequence)
     box = sequence_box(sequence, smoke)
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.

@@ -56,8 +56,9 @@ class TrainConfig(CourseConfig):
     motion: MotionConfig = field(default_factory=MotionConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     winds: bool = False
-    """Tell each state of the pool another speed and density of the smoke, and turn the velocity for
-    every other: the rule learns from one frame to paint smoke that moves otherwise."""
+    """Tell each state of the pool another speed and density of the smoke, and for every other turn
+    the velocity and carry all of the smoke along: the rule learns from one frame to paint smoke
+    that moves otherwise."""
 
     @property
     def pictures(self) -> Pictures:

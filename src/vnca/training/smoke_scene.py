@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from vnca.automaton.domain import Domain
-from vnca.automaton.priors import DENSITY, VELOCITY, priors
+from vnca.automaton.priors import DENSITY, VELOCITY, priors, told_velocity
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
 from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable
 from vnca.errors import GridError
@@ -25,6 +25,8 @@ from vnca.volume import Volume
 
 SPEEDS = (0.25, 1.5)
 """How much slower or faster than in the frame smoke moves in a wind, at most."""
+STRONGEST = 1.5
+"""The strongest wind that carries all of the smoke along, in units of the smoke's typical speed."""
 DENSEST = 2.0
 """How much denser, or thinner, than it is the rule is told that it is, at most."""
 PORTRAITS = ((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (30.0, 60.0))
@@ -103,24 +105,31 @@ class SmokeScene(Scene[SmokeSight]):
             velocity[:] = domain.gather(smoke.velocity, smoke.origin)
         self.moves = bool(velocity.any())
         self.velocity = torch.from_numpy(velocity).to(device)
+        self._rule = rule
 
     def variant(self, place: int) -> "SmokeScene":
         """The smoke in the wind of a place: faster or slower, and told to be denser or thinner.
 
-        At odd places its velocity is turned at random, too. The rule is told the velocity of the
-        wind, and motion is judged by it; the density that is seen stays as it is.
+        At odd places its velocity is turned at random, too, and all of it carried along one way.
+        The rule is told the velocity of the wind, and motion is judged by it; the density that is
+        seen stays as it is.
         """
         if not (self.winds and self.moves):
             return self
         random = np.random.default_rng(place)
-        turn = Rotation.from_quat(random.standard_normal(4)).as_matrix()
-        turn = (turn if place % 2 else np.eye(3)) * random.uniform(*SPEEDS)
-        turned = torch.from_numpy(turn.T.astype(np.float32)).to(self.velocity.device)
+        velocity = self.velocity.cpu().numpy() * random.uniform(*SPEEDS)
+        denser = DENSEST ** random.uniform(-1, 1)
+        if place % 2:
+            turn, heading = Rotation.from_quat(random.standard_normal((2, 4))).as_matrix()
+            strength = random.uniform(0, STRONGEST) * self._rule.scales.velocity
+            velocity = velocity @ turn + strength * heading[0]
+        velocity = velocity.astype(np.float32)
+        told = torch.from_numpy(told_velocity(velocity, self._rule))
         scene = copy.copy(self)
-        scene.velocity = self.velocity @ turned
+        scene.velocity = torch.from_numpy(velocity).to(self.velocity)
         scene.priors = self.priors.clone()
-        scene.priors[:, VELOCITY] = self.priors[:, VELOCITY] @ turned
-        scene.priors[:, DENSITY] *= DENSEST ** random.uniform(-1, 1)
+        scene.priors[:, VELOCITY] = told.to(self.priors)
+        scene.priors[:, DENSITY] *= denser
         return scene
 
     def camera(
