@@ -27,15 +27,20 @@ class Density(Study):
     or in all of its box as in the paper; as the preset has it unless given."""
     velocity: bool = True
     """Whether cells are told the velocity, by which they can tell where smoke is, too."""
+    position: bool = False
+    """Tell cells their place in the box, as the preset of --full does anyway."""
 
     @property
     def config(self) -> TrainConfig:
         """That of the reference."""
         config = super().config
-        domain = self.domain or config.rule.domain
-        return replace(
-            config, rule=replace(config.rule, domain=domain, velocity_prior=self.velocity)
+        rule = replace(
+            config.rule,
+            domain=self.domain or config.rule.domain,
+            velocity_prior=self.velocity,
+            position_prior=self.position or config.rule.position_prior,
         )
+        return replace(config, rule=rule)
 
 
 def compare(study: Density) -> None:
@@ -43,8 +48,10 @@ def compare(study: Density) -> None:
     rule_config = replace(config.rule, density_prior=False)
     kinds = {"with": config, "without": replace(config, rule=rule_config)}
     where, name = f"cells in {DOMAINS[config.rule.domain]}", f"density_{config.rule.domain}"
+    if config.rule.position_prior:
+        where, name = f"{where}, told their place", f"{name}_with_position"
     if not study.velocity:
-        where, name = f"{where} told no velocity", f"{name}_without_velocity"
+        where, name = f"{where}, told no velocity", f"{name}_without_velocity"
     findings, pictures = Findings(study, "density"), {}
     reference = study.trained(REFERENCE, config, study.seeds[0])
     white = paint(reference, smoke, UNPAINTED)
