@@ -90,6 +90,12 @@ def test_fast_smoke_is_told_where_it_goes_and_no_speed_beyond_the_limit() -> Non
     assert told.dtype == np.float32
 
 
+def test_a_velocity_as_large_as_a_file_can_hold_is_told_as_any_other() -> None:
+    huge = np.array([[3e38, 0, 0], [0, -1e25, 0]], np.float32)
+    told = told_velocity(huge, rule())
+    np.testing.assert_allclose(told, [[2, 0, 0], [0, -2, 0]], rtol=1e-6)
+
+
 def test_the_seed_shows_middle_grey_and_leaves_density_alone() -> None:
     state = np.zeros((2, 12), dtype=np.float32)
     np.testing.assert_allclose(linear_to_srgb(colours(state)), 0.5, atol=1e-6)

@@ -16,7 +16,9 @@ SPEED_LIMIT = 2.0
 """Cells are told no normalised speed above this: training has hardly met faster smoke, and what a
 rule has not met it paints badly. Nor must a file in other units blow a state up."""
 DENSITY_LIMIT = 4.0
-"""Likewise for density."""
+"""Nor are they told a greater normalised density."""
+_SQUARABLE = 1e18
+"""Single precision holds the square of it."""
 
 
 def priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
@@ -46,6 +48,6 @@ def told_velocity(velocity: FloatArray, rule: Rule) -> FloatArray:
     """
     if not rule.config.velocity_prior:
         return np.zeros_like(velocity)
-    told = velocity / rule.scales.velocity
+    told = np.clip(velocity / rule.scales.velocity, -_SQUARABLE, _SQUARABLE)
     speed = np.linalg.norm(told, axis=-1, keepdims=True)
     return told * (SPEED_LIMIT / np.maximum(speed, SPEED_LIMIT))
