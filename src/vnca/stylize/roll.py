@@ -18,6 +18,7 @@ from vnca.automaton.paint import colours, density_factors
 from vnca.automaton.priors import priors
 from vnca.automaton.rule import SMOKE_THRESHOLD, Rule
 from vnca.automaton.stepper import Step
+from vnca.bricks.field import Field
 from vnca.io.velocity import extrapolated
 from vnca.kernels.update.mask import changing_rows
 from vnca.stylize.config import StylizeConfig
@@ -162,8 +163,7 @@ class Roll:
         if self.domain_kind == "box":
             return self._whole_box
         return Domain.around_smoke(
-            smoke.density,
-            smoke.origin,
+            Field.from_dense(smoke.density, smoke.origin),
             threshold=SMOKE_THRESHOLD * self.rule.scales.density,
             reach=self.rule.config.reach,
             box=self.box.grown(self.rule.config.reach),
