@@ -11,7 +11,7 @@ ROOT = Path(vnca.__file__).parent
 RANKS = {
     "errors": 0, "typing": 0,
     "bricks": 1,
-    "volume": 2, "camera": 2, "colour": 2, "files": 2, "kernels": 2,
+    "volume": 2, "lattice": 2, "camera": 2, "colour": 2, "files": 2, "kernels": 2,
     "io": 3, "automaton": 3, "render": 3, "features": 3, "simulate": 3,
     "losses": 4, "stylize": 4,
     "training": 5,
@@ -19,8 +19,8 @@ RANKS = {
     "cli": 7,
 }  # fmt: skip
 WITHOUT_TORCH = {
-    "errors", "typing", "bricks", "volume", "camera", "colour", "files", "io", "automaton",
-    "simulate", "stylize",
+    "errors", "typing", "bricks", "volume", "lattice", "camera", "colour", "files", "io",
+    "automaton", "simulate", "stylize",
 }  # fmt: skip
 KERNELS_WITH_TORCH = {
     "reference.py", "native_autograd.py", "perceivers.py", "triton.py", "triton_mask.py",
