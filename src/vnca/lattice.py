@@ -6,22 +6,23 @@ What goes from frame to frame needs cells that stay where they are in the world:
 exchanged, mirrored and shifted by whole cells, interpolated where not.
 """
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations, product
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from vnca.bricks.field import Field
+from vnca.bricks.places import CELLS, EDGE, sorted_bricks
 from vnca.errors import GridError
-from vnca.typing import AnyArray, Box, FloatArray, Index
+from vnca.typing import AnyArray, Box, FloatArray, Index, IntArray
 
 Beyond = Literal["nothing", "nearest"]
 """What there is beyond the cells of an array: nothing, or what its nearest cell holds."""
 
 MOST_CELLS = 2**27
-"""An array that is interpolated may not have more cells (512³)."""
+"""What is interpolated may not take more cells (512³)."""
 _TOLERANCE = 1e-3
 """Of lengths and of cosines: closer to cubic, or to a right angle, is that."""
 _APART = 1e-2
@@ -184,33 +185,34 @@ class Placement:
             )
         return Box(_index(lower), _index(upper))
 
-    def array(
-        self, values: FloatArray, box: Box, over: Box, beyond: Beyond = "nothing"
-    ) -> FloatArray:
-        """Values `[x, y, z, ...]` of the cells of `box`, as the other grid has them `over` a box.
+    def field(self, field: Field, over: Box | None = None, beyond: Beyond = "nothing") -> Field:
+        """The values of the one grid's cells, as the other has them.
 
         Where cells do not lie on cells, they are interpolated linearly between centres; a cell of
         the other grid that is larger has the mean of several places in it.
 
         Args:
-            values: Of the cells of one grid.
-            box: Which they are.
-            over: The wanted cells of the other.
-            beyond: What there is beyond `box`; nothing where cells lie on cells.
+            field: Of the cells of the one grid.
+            over: The wanted cells of the other; those that `box` gives unless given.
+            beyond: What there is beyond the box of the field; nothing where cells lie on cells.
+
+        Raises:
+            GridError: If interpolating takes too many cells.
         """
-        shape = (*over.shape, *values.shape[3:])
-        if box.is_empty or over.is_empty:
-            return np.zeros(shape, values.dtype)
+        over = self.box(field.box) if over is None else over
+        if field.box.is_empty or over.is_empty:
+            nothing = slice(0, 0)
+            return replace(
+                field, bricks=field.bricks[nothing], values=field.values[nothing], box=over
+            )
         if not self.is_whole:
-            return self._interpolated(values, box, over, beyond)
-        covered, turned = self.box(box), self._turned(values)
-        if covered == over:
-            return np.ascontiguousarray(turned)
-        result = np.zeros(shape, values.dtype)
-        both = covered.intersection(over)
-        if not both.is_empty:
-            result[both.slices(over)] = turned[both.slices(covered)]
-        return result
+            return self._interpolated(field, over, beyond)
+        linear = self.matrix[:3, :3]
+        order, signs = np.abs(linear).argmax(axis=1).tolist(), linear.sum(axis=1).astype(int)
+        # Mirrored, cell i becomes cell -1 - i.
+        by = _index(self.matrix[:3, 3] + (signs < 0))
+        moved = field.turned(order, signs.tolist()).moved(by)
+        return moved if moved.box == over else replace(moved.within(over), box=over)
 
     def vectors(self, values: FloatArray) -> FloatArray:
         """Vectors `[..., 3]` in cells of the one grid, in cells of the other."""
@@ -229,27 +231,45 @@ class Placement:
         sides = np.linalg.norm(np.linalg.inv(self.matrix[:3, :3]), axis=0)
         return _index(np.maximum(1, np.ceil(sides - _APART)))
 
-    def _turned(self, values: FloatArray) -> FloatArray:
-        linear = self.matrix[:3, :3]
-        order = np.abs(linear).argmax(axis=1).tolist()
-        steps = linear.sum(axis=1).astype(int).tolist()
-        values = values.transpose(*order, *range(3, values.ndim))
-        return values[tuple(slice(None, None, step) for step in steps)]
-
-    def _interpolated(self, values: FloatArray, box: Box, over: Box, beyond: Beyond) -> FloatArray:
-        result = np.zeros((*over.shape, *values.shape[3:]), np.float32)
-        flat = result.reshape(-1, *values.shape[3:])
+    def _interpolated(self, field: Field, over: Box, beyond: Beyond) -> Field:
+        # A cell has a share in those whose centres are less than one cell away.
+        bricks = self._bricks_over(field, over, 1 if beyond == "nothing" else 2)
+        values = np.empty((len(bricks), CELLS, *field.values.shape[4:]), np.float32)
         back = np.linalg.inv(self.matrix)
-        back[:3, 3] -= box.lower
         parts = [(np.arange(count) + 0.5) / count - 0.5 for count in self._parts]
         places = [np.array(place) for place in product(*parts)]
-        for start in range(0, len(flat), _SLAB):
-            slab = slice(start, min(start + _SLAB, len(flat)))
-            cells = np.arange(slab.start, slab.stop)
-            at = np.stack(np.unravel_index(cells, over.shape), axis=-1) + np.array(over.lower)
-            total = sum(_between_centres(values, _at(at + place, back), beyond) for place in places)
-            flat[slab] = total / len(places)
-        return result
+        within = np.array(list(product(range(EDGE), repeat=3)))
+        for start in range(0, len(bricks), _SLAB // CELLS):
+            slab = slice(start, start + _SLAB // CELLS)
+            at = (bricks[slab, None] * EDGE + within).reshape(-1, 3)
+            total = np.sum(
+                [_between_centres(field, _at(at + place, back), beyond) for place in places], axis=0
+            )
+            values[slab] = (total / len(places)).reshape(-1, *values.shape[1:])
+        values = values.reshape(-1, *field.values.shape[1:])
+        return replace(field, bricks=bricks, values=values, box=over).within(over)
+
+    def _bricks_over(self, field: Field, over: Box, margin: int) -> IntArray:
+        """Bricks of the other grid, in a box, that those of a field and cells beside reach into."""
+        ends = field.bricks[:, None] * EDGE + np.array(
+            list(product((-margin - 0.5, EDGE - 0.5 + margin), repeat=3))
+        )
+        corners = _at(ends, self.matrix)
+        # Where a mean is taken, half a cell more.
+        first = np.maximum(np.floor(corners.min(axis=1) - 0.5), over.lower) // EDGE
+        last = np.minimum(np.ceil(corners.max(axis=1) + 0.5), np.array(over.upper) - 1) // EDGE
+        counts = np.maximum(last - first + 1, 0)
+        # Bricks that lie beside each other reach into some of the same.
+        if counts.prod(axis=1).sum() * CELLS <= 8 * MOST_CELLS:
+            steps = product(*map(range, counts.max(axis=0, initial=0).astype(int)))
+            found = [first[(counts > step).all(axis=1)] + step for step in steps]
+            bricks = sorted_bricks(np.concatenate([np.empty((0, 3)), *found]))
+            if len(bricks) * CELLS <= MOST_CELLS:
+                return bricks
+        raise GridError(
+            f"{self.what}: takes more than {MOST_CELLS} cubic cells as small as the shortest side "
+            "of the sequence's voxels; resample it to more even voxels"
+        )
 
 
 def require_right_angles(index_to_world: AnyArray, what: str) -> None:
@@ -268,20 +288,6 @@ def require_right_angles(index_to_world: AnyArray, what: str) -> None:
         raise GridError(
             f"{what}: its voxels are sheared (their sides meet at {angles} degrees); resample it "
             "to a grid of right angles"
-        )
-
-
-def require_room(box: Box, what: str) -> None:
-    """Refuse to interpolate over more cells than fit; `what` is named in the message.
-
-    Raises:
-        GridError: If there are too many.
-    """
-    if math.prod(box.shape) > MOST_CELLS:
-        cells = " × ".join(map(str, box.shape))
-        raise GridError(
-            f"{what}: takes {cells} cubic cells as small as the shortest side of the sequence's "
-            f"voxels, of {MOST_CELLS} at most; resample it to more even voxels"
         )
 
 
@@ -329,20 +335,21 @@ def _index(numbers: AnyArray) -> Index:
     return x, y, z
 
 
-def _between_centres(values: FloatArray, at: AnyArray, beyond: Beyond) -> FloatArray:
-    """Values at places `[n, 3]`, counted in cells from the first centre, linear in between."""
-    last = np.array(values.shape[:3]) - 1
+def _between_centres(field: Field, at: AnyArray, beyond: Beyond) -> FloatArray:
+    """Values at places `[n, 3]` in index coordinates, linear in between."""
+    first = np.array(field.box.lower)
+    last = np.array(field.box.upper) - 1
     if beyond == "nearest":
-        at = np.clip(at, 0, last)
+        at = np.clip(at, first, last)
     below = np.floor(at)
     part = at - below
-    total = np.zeros((len(at), *values.shape[3:]), np.float32)
+    kind = field.values.shape[4:]
+    total = np.zeros((len(at), *kind), np.float32)
     for corner, weight in _weighted(part):
         cell = below + corner
-        weight = weight * ((cell >= 0) & (cell <= last)).all(axis=1)
-        where = np.clip(cell, 0, last).astype(np.intp)
-        share = weight.astype(np.float32).reshape(-1, *[1] * (values.ndim - 3))
-        total += share * values[tuple(where.T)]
+        weight = weight * ((cell >= first) & (cell <= last)).all(axis=1)
+        where = np.clip(cell, first, last).astype(np.int32)
+        total += weight.astype(np.float32).reshape(-1, *[1] * len(kind)) * field.gather(where)
     return total
 
 

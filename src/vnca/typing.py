@@ -1,5 +1,6 @@
 """Aliases for the arrays and boxes that travel between modules."""
 
+from operator import add
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -46,6 +47,10 @@ class Box(NamedTuple):
         x, y, z = self.lower
         u, v, w = self.upper
         return Box((x - cells, y - cells, z - cells), (u + cells, v + cells, w + cells))
+
+    def moved(self, by: Index) -> "Box":
+        """The box so many cells farther along each axis."""
+        return Box(_each(add, self.lower, by), _each(add, self.upper, by))
 
     def refined(self, factor: int) -> "Box":
         """The same region in cells `factor` times as fine along each axis."""

@@ -1,16 +1,27 @@
-"""One frame of smoke as arrays, whatever file it came from."""
+"""One frame of smoke, whatever file it came from."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from vnca.bricks.dense import dense, field_of, shape_of
+from vnca.bricks.field import Field
+from vnca.bricks.refinement import refined
 from vnca.errors import ShapeError
 from vnca.typing import AnyArray, Box, FloatArray, Index
 
 
+@dense("density", "velocity")
 @dataclass(frozen=True, eq=False)
 class Volume:
     """Density and velocity on a grid, up along +z.
+
+    Both are arrays of all cells of a box. Smoke from files is kept as fields instead, which take
+    the memory that the smoke takes, however large its box is (`density_field`, `velocity_field`);
+    the arrays are made when they are asked for, and a box of far more cells than there is smoke
+    in it is refused then (`GridError`).
 
     Attributes:
         density: `[x, y, z]`, non-negative, in the units of its file.
@@ -28,19 +39,39 @@ class Volume:
     frame: int
 
     def __post_init__(self) -> None:
-        if self.density.ndim != 3:
-            raise ShapeError(f"density: expected [x, y, z], got shape {self.density.shape}")
-        if self.velocity is not None and self.velocity.shape != (*self.density.shape, 3):
+        density, velocity = shape_of(self, "density"), shape_of(self, "velocity")
+        if density is None or len(density) != 3:
+            raise ShapeError(f"density: expected [x, y, z], got shape {density}")
+        if velocity is not None and velocity != (*density, 3):
             raise ShapeError(
-                f"velocity: expected {(*self.density.shape, 3)} to match the density, "
-                f"got {self.velocity.shape}"
+                f"velocity: expected {(*density, 3)} to match the density, got {velocity}"
             )
+
+    @classmethod
+    def of_fields(
+        cls, density: Field, velocity: Field | None, index_to_world: AnyArray, frame: int
+    ) -> "Volume":
+        """Smoke given by where there is any; both fields cover one box."""
+        smoke: Any = density
+        motion: Any = velocity
+        return cls(smoke, motion, density.origin, index_to_world, frame)
 
     @property
     def box(self) -> Box:
         """The cells the arrays cover, in index space."""
-        x, y, z = (o + n for o, n in zip(self.origin, self.density.shape, strict=True))
+        shape = shape_of(self, "density") or ()
+        x, y, z = (o + n for o, n in zip(self.origin, shape, strict=True))
         return Box(self.origin, (x, y, z))
+
+    @cached_property
+    def density_field(self) -> Field:
+        """The density where there is any."""
+        return field_of(self, "density", self.origin)
+
+    @cached_property
+    def velocity_field(self) -> Field | None:
+        """The velocity where there is any."""
+        return field_of(self, "velocity", self.origin)
 
     @property
     def voxel_size(self) -> tuple[float, float, float]:
@@ -56,14 +87,13 @@ class Volume:
         """
         if factor == 1:
             return self
-        velocity = self.velocity
+        velocity = self.velocity_field
         if velocity is not None:
-            velocity = _interpolated(velocity, factor)
-            velocity *= factor
-        return Volume(
-            _interpolated(self.density, factor),
+            velocity = refined(velocity, factor)
+            np.multiply(velocity.values, factor, out=velocity.values)
+        return Volume.of_fields(
+            refined(self.density_field, factor),
             velocity,
-            self.box.refined(factor).lower,
             refined_transform(self.index_to_world, factor),
             self.frame,
         )
@@ -74,20 +104,3 @@ def refined_transform(index_to_world: AnyArray, factor: int) -> AnyArray:
     finer = np.diag([1 / factor, 1 / factor, 1 / factor, 1.0])
     finer[:3, 3] = 0.5 / factor - 0.5
     return index_to_world @ finer
-
-
-def _interpolated(field: FloatArray, factor: int) -> FloatArray:
-    """`[x, y, z, ...]` at the centres of cells `factor` times as fine."""
-    for axis, cells in enumerate(field.shape[:3]):
-        at = (np.arange(factor * cells) + 0.5) / factor - 0.5
-        at = np.clip(at, 0, max(cells - 1, 0))
-        below = at.astype(np.intp)
-        above = np.minimum(below + 1, cells - 1)
-        weight = (at - below).astype(np.float32).reshape(-1, *[1] * (field.ndim - axis - 1))
-        # In place: the finer arrays are the largest there are.
-        values, step = field.take(below, axis), field.take(above, axis)
-        step -= values
-        step *= weight
-        values += step
-        field = values
-    return field

@@ -9,6 +9,7 @@ from scipy import ndimage
 from vnca.bricks.field import Field
 from vnca.bricks.growth import dilated
 from vnca.bricks.places import Places, bricks_beside, cells_at, sorted_bricks
+from vnca.bricks.refinement import refined
 from vnca.errors import GridError
 from vnca.typing import AnyArray, Box, Index
 
@@ -105,14 +106,59 @@ def test_marks_grow_as_in_a_dense_array(seed: int, shape: Index, origin: Index, 
 
 
 @few
-@given(seeds, shapes, origins, st.permutations(range(3)))
-def test_axes_are_exchanged(seed: int, shape: Index, origin: Index, order: list[int]) -> None:
+@given(
+    seeds,
+    shapes,
+    origins,
+    st.permutations(range(3)),
+    st.tuples(*[st.sampled_from([1, -1])] * 3),
+)
+def test_axes_are_exchanged_and_mirrored(
+    seed: int, shape: Index, origin: Index, order: list[int], signs: Index
+) -> None:
     values = sparse(seed, (*shape, 2))
-    a, b, c = order
-    turned = Field.from_dense(values, origin, outside=0.5).turned((a, b, c))
-    np.testing.assert_array_equal(turned.dense(), values.transpose(*order, 3))
-    assert turned.origin == tuple(origin[axis] for axis in order)
+    field = Field.from_dense(values, origin, outside=0.5)
+    turned = field.turned(order, signs)
+    flipped = values.transpose(*order, 3)[tuple(slice(None, None, sign) for sign in signs)]
+    np.testing.assert_array_equal(turned.dense(), flipped)
     assert (turned.bricks == sorted_bricks(turned.bricks)).all()
+    for axis, (source, sign) in enumerate(zip(order, signs, strict=True)):
+        ends = origin[source], origin[source] + shape[source]
+        assert (turned.box.lower[axis], turned.box.upper[axis]) == (
+            ends if sign > 0 else (-ends[1], -ends[0])
+        )
+
+
+@few
+@given(seeds, shapes, origins, st.tuples(*[st.integers(-20, 20)] * 3))
+def test_cells_are_moved(seed: int, shape: Index, origin: Index, by: Index) -> None:
+    values = sparse(seed, shape)
+    moved = Field.from_dense(values, origin, outside=0.5).moved(by)
+    assert moved.origin == tuple(np.add(origin, by))
+    np.testing.assert_array_equal(moved.dense(), values)
+    assert (moved.bricks == sorted_bricks(moved.bricks)).all()
+
+
+def dense_refined(values: AnyArray, factor: int) -> AnyArray:
+    """Linear between centres along one axis after the other, the outermost going on."""
+    for axis, cells in enumerate(values.shape[:3]):
+        at = np.clip((np.arange(factor * cells) + 0.5) / factor - 0.5, 0, cells - 1)
+        below = at.astype(int)
+        weight = (at - below).astype(np.float32).reshape(-1, *[1] * (values.ndim - axis - 1))
+        low = values.take(below, axis)
+        values = low + (values.take(np.minimum(below + 1, cells - 1), axis) - low) * weight
+    return values
+
+
+@few
+@given(seeds, st.tuples(*[st.integers(1, 11)] * 3), origins, st.integers(2, 5))
+def test_finer_fields_are_finer_arrays_to_the_bit(
+    seed: int, shape: Index, origin: Index, factor: int
+) -> None:
+    values = sparse(seed, (*shape, 2)) - np.float32(0.5)
+    finer = refined(Field.from_dense(values, origin), factor)
+    np.testing.assert_array_equal(finer.dense(), dense_refined(values, factor))
+    assert (finer.bricks == sorted_bricks(finer.bricks)).all()
 
 
 def test_bricks_are_found_at_the_ends_of_the_index_range() -> None:

@@ -64,8 +64,8 @@ def test_a_frame_that_lies_on_its_lattice_is_not_touched() -> None:
     for was, now in ((smoke.density, laid.density), (smoke.velocity, laid.velocity)):
         assert was is not None
         assert now is not None
-        assert np.shares_memory(now, was)
         np.testing.assert_array_equal(now, was)
+    assert np.shares_memory(laid.density_field.values, smoke.density_field.values)
 
 
 def test_interpolated_velocity_does_not_slow_down_at_the_border() -> None:
@@ -110,9 +110,7 @@ def test_a_later_frame_that_is_sheared_or_much_too_large_is_refused() -> None:
     with pytest.raises(GridError, match="frame 8: its voxels are sheared"):
         list(on_one_lattice([cloud(np.eye(4)), cloud(sheared, frame=8)]))
     vast = np.diag([500, 500, 500, 1.0])
-    with pytest.raises(
-        GridError, match=rf"frame 8: takes \d+ × \d+ × \d+ cubic .* {MOST_CELLS} at"
-    ):
+    with pytest.raises(GridError, match=rf"frame 8: takes more than {MOST_CELLS} cubic cells"):
         list(on_one_lattice([cloud(np.eye(4)), cloud(vast, frame=8)]))
     far = np.eye(4)
     far[0, 3] = 1e12

@@ -5,9 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vnca.bricks.field import Field
 from vnca.errors import GridError, OptionError
-from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
-from vnca.typing import BoolArray, FloatArray
+from vnca.io import velocity as in_fields
+from vnca.io.velocity import cells_per_frame, fit_velocity_scale
+from vnca.typing import BoolArray, FloatArray, Index
 from vnca.volume import Volume
 
 
@@ -16,6 +18,23 @@ def mask(shape: tuple[int, int, int], *cells: tuple[int, int, int]) -> BoolArray
     for cell in cells:
         result[cell] = True
     return result
+
+
+def centred(
+    faces: FloatArray, stored: BoolArray, staggered: tuple[bool, bool, bool] = (True, True, True)
+) -> FloatArray:
+    fields = Field.from_dense(faces, (3, -4, 5)), Field.from_dense(stored, (3, -4, 5))
+    centres, at = in_fields.centred(*fields, staggered)
+    np.testing.assert_array_equal(at.dense(), stored[:-1, :-1, :-1])
+    return centres.dense()
+
+
+def extrapolated(
+    values: FloatArray, known: BoolArray, layers: int, origin: Index = (-3, 4, 6)
+) -> tuple[FloatArray, BoolArray]:
+    fields = Field.from_dense(values, origin), Field.from_dense(known, origin)
+    found, filled = in_fields.extrapolated(*fields, layers)
+    return found.dense(), filled.dense()
 
 
 def test_a_linear_flow_on_faces_is_exact_at_centres() -> None:
@@ -76,6 +95,38 @@ def test_a_new_cell_is_the_mean_of_its_known_neighbours() -> None:
     np.testing.assert_array_equal(filled[1, 1, 0], (3, 0.5, 2))
     np.testing.assert_array_equal(filled[2, 0, 0], (4, 1, 0))
     np.testing.assert_array_equal(filled[known], velocity[known])
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.tuples(*[st.integers(1, 20)] * 3),
+    st.tuples(*[st.integers(-20, 20)] * 3),
+    st.integers(0, 2**32 - 1),
+    st.integers(0, 10),
+)
+def test_bricks_continue_a_velocity_as_an_array_does_to_the_bit(
+    shape: Index, origin: Index, seed: int, layers: int
+) -> None:
+    random = np.random.default_rng(seed)
+    known = random.random(shape) < 0.01
+    expected = random.standard_normal((*shape, 3)).astype(np.float32) * known[..., None]
+    filled, found = known.copy(), extrapolated(expected, known, layers, origin)
+    for _ in range(layers):
+        wide, there = np.pad(expected, [(1, 1)] * 3 + [(0, 0)]), np.pad(filled, 1)
+        total, count = np.zeros((*shape, 3)), np.zeros(shape)
+        for axis in range(3):
+            for start in (0, 2):
+                place = tuple(
+                    slice(start, start + n) if a == axis else slice(1, 1 + n)
+                    for a, n in enumerate(shape)
+                )
+                total += wide[place]
+                count += there[place]
+        front = (count > 0) & ~filled
+        expected[front] = total[front] / count[front, None]
+        filled |= front
+    np.testing.assert_array_equal(found[0], expected)
+    np.testing.assert_array_equal(found[1], filled)
 
 
 @pytest.mark.parametrize("shape", [(0, 0, 0), (1, 1, 1), (3, 1, 2)])

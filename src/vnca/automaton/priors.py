@@ -35,10 +35,10 @@ def priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
     if config.position_prior:
         values[:, POSITION] = _positions(domain, smoke, rule)
     if config.density_prior:
-        density = domain.gather(smoke.density, smoke.origin)
+        density = smoke.density_field.gather(domain.cells)
         values[:, DENSITY] = np.minimum(density / scales.density, DENSITY_LIMIT)[:, None]
-    if smoke.velocity is not None:
-        values[:, VELOCITY] = told_velocity(domain.gather(smoke.velocity, smoke.origin), rule)
+    if smoke.velocity_field is not None:
+        values[:, VELOCITY] = told_velocity(smoke.velocity_field.gather(domain.cells), rule)
     return values
 
 

@@ -1,6 +1,7 @@
 """Values on a grid, kept only in the bricks where they are other than everywhere else."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -18,7 +19,7 @@ from vnca.bricks.places import (
     sorted_bricks,
 )
 from vnca.errors import GridError
-from vnca.typing import AnyArray, Box, Index, IntArray
+from vnca.typing import AnyArray, BoolArray, Box, Index, IntArray
 
 MOST_CELLS = 2**27
 """A larger box (512³) becomes one array only if a good part of it holds something."""
@@ -42,8 +43,19 @@ class Field:
     outside: Any = 0
 
     @classmethod
-    def from_dense(cls, values: AnyArray, origin: Index, *, outside: Any = 0) -> "Field":
-        """The values `[x, y, z, ...]` of an array whose first cell has coordinates `origin`."""
+    def from_dense(
+        cls, values: AnyArray, origin: Index, *, outside: Any = 0, held: BoolArray | None = None
+    ) -> "Field":
+        """The values `[x, y, z, ...]` of an array whose first cell has coordinates `origin`.
+
+        Args:
+            values: The array.
+            origin: Index coordinates of its first cell.
+            outside: The value of most.
+            held: `[x, y, z]`, cells whose bricks are kept; those of another value unless given.
+        """
+        if held is None:
+            held = np.asarray((values != outside).any(axis=tuple(range(3, values.ndim))))
         x, y, z = (start + cells for start, cells in zip(origin, values.shape, strict=False))
         before = [start % EDGE for start in origin]
         cells = zip(before, values.shape, strict=False)
@@ -51,9 +63,12 @@ class Field:
         if any(map(any, padding)):
             wide = padding + [(0, 0)] * (values.ndim - 3)
             values = np.pad(values, wide, constant_values=outside)
+            held = np.pad(held, padding)
         blocks = as_bricks(np.ascontiguousarray(values))
-        occupied = (values != outside).any(axis=tuple(range(3, values.ndim)))
-        at = np.argwhere(as_bricks(occupied).any(axis=(3, 4, 5)))
+        # Eight booleans along z are one integer: much the fastest way to see who holds nothing.
+        columns = np.ascontiguousarray(held).view(np.uint64)
+        i, j, k = columns.shape
+        at = np.argwhere(columns.reshape(i // EDGE, EDGE, j // EDGE, EDGE, k).any(axis=(1, 3)))
         first = [start // EDGE for start in origin]
         i, j, k = at.T
         return cls((at + first).astype(np.int32), blocks[i, j, k], Box(origin, (x, y, z)), outside)
@@ -149,8 +164,7 @@ class Field:
         along = np.arange(EDGE)
         # An axis and its places in the brick: `[k, 8]` each.
         x, y, z = (
-            (along >= first[cut, axis, None]) & (along < last[cut, axis, None])
-            for axis in range(3)
+            (along >= first[cut, axis, None]) & (along < last[cut, axis, None]) for axis in range(3)
         )
         beyond = ~(x[:, :, None, None] & y[:, None, :, None] & z[:, None, None, :])
         partial = values[cut]
@@ -159,22 +173,57 @@ class Field:
         return replace(self, bricks=self.bricks[kept], values=values, box=box)
 
     def trimmed(self) -> "Field":
-        """The same without the bricks that hold nothing."""
+        """The same, without the bricks that hold nothing."""
         kept = (self.values != self.outside).any(axis=tuple(range(1, self.values.ndim)))
         if kept.all():
             return self
         return replace(self, bricks=self.bricks[kept], values=self.values[kept])
 
-    def turned(self, order: Index) -> "Field":
-        """With other axes: axis `a` of the result is axis `order[a]` of this one."""
-        if order == (0, 1, 2):
+    def turned(self, order: Sequence[int], signs: Sequence[int] = (1, 1, 1)) -> "Field":
+        """With other axes: axis `a` of the result is axis `order[a]` of this one.
+
+        Where `signs[a]` is -1 it runs the other way: cell i becomes cell -1 - i.
+        """
+        if (*order, *signs) == (0, 1, 2, 1, 1, 1):
             return self
+        lower, upper = [], []
         bricks = self.bricks[:, order]
-        sorting = np.lexsort(bricks.T[::-1])
-        axes = (0, *(1 + axis for axis in order), *range(4, self.values.ndim))
-        values = np.ascontiguousarray(self.values[sorting].transpose(axes))
-        box = Box(*(_picked(corner, order) for corner in self.box))
-        return replace(self, bricks=bricks[sorting], values=values, box=box)
+        for axis, (source, sign) in enumerate(zip(order, signs, strict=True)):
+            low, high = self.box.lower[source], self.box.upper[source]
+            lower.append(low if sign > 0 else -high)
+            upper.append(high if sign > 0 else -low)
+            if sign < 0:
+                bricks[:, axis] = -1 - bricks[:, axis]
+        values = self.values.transpose(
+            0, *(1 + axis for axis in order), *range(4, self.values.ndim)
+        )
+        values = values[(slice(None), *(slice(None, None, sign) for sign in signs))]
+        box = Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
+        return replace(self, bricks=bricks, values=values, box=box).in_order()
+
+    def in_order(self) -> "Field":
+        """The same with its bricks as they must be, if they are not."""
+        order = np.lexsort(self.bricks.T[::-1])
+        return replace(self, bricks=self.bricks[order], values=self.values[order])
+
+    def moved(self, by: Index) -> "Field":
+        """With every cell so many cells farther along each axis."""
+        whole = np.array([step // EDGE for step in by], np.int32)
+        field = replace(self, bricks=self.bricks + whole, box=self.box.moved(by))
+        for axis, step in enumerate(by):
+            if rest := step % EDGE:
+                field = field._moved_within_bricks(axis, rest)
+        return field
+
+    def _moved_within_bricks(self, axis: int, step: int) -> "Field":
+        ahead = np.zeros(3, np.int32)
+        ahead[axis] = 1
+        bricks = sorted_bricks(np.concatenate([self.bricks, self.bricks + ahead]))
+        low, high = _slab(axis, slice(None, step)), _slab(axis, slice(step, None))
+        result = np.empty((len(bricks), *self.values.shape[1:]), self.values.dtype)
+        result[high] = self.blocks(bricks)[_slab(axis, slice(None, -step))]
+        result[low] = self.blocks(bricks - ahead)[_slab(axis, slice(-step, None))]
+        return replace(self, bricks=bricks, values=result).trimmed()
 
     def dense(self, box: Box | None = None) -> AnyArray:
         """The array `[x, y, z, ...]` over a box; over all cells unless given.
@@ -215,11 +264,6 @@ def _slab(axis: int, part: slice) -> tuple[slice, ...]:
 
 def _aligned(corner: Index, up: bool) -> Index:
     x, y, z = ((cell + (EDGE - 1) * up) // EDGE * EDGE for cell in corner)
-    return x, y, z
-
-
-def _picked(index: Index, order: Index) -> Index:
-    x, y, z = (index[axis] for axis in order)
     return x, y, z
 
 

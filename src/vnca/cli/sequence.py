@@ -16,7 +16,7 @@ from vnca.io.orientation import on_lattice
 from vnca.io.sequence import FrameSequence, find_frames, format_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
 from vnca.io.smoke_format import Extent
-from vnca.lattice import Lattice, Placement, Region, require_room
+from vnca.lattice import Lattice, Placement, Region
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.painter import BROKEN
 from vnca.typing import AnyArray, Box
@@ -117,10 +117,7 @@ def sequence_region(
 def _covered(extent: Extent, lattice: Lattice, what: str) -> tuple[Box, bool]:
     """The cells of a lattice that a frame has a part in, and whether its cells are those."""
     place = Placement.between(extent.index_to_world, lattice.to_world, extent.box, what)
-    box = place.box(extent.box)
-    if not place.is_whole:
-        require_room(box, what)
-    return box, place.is_whole
+    return place.box(extent.box), place.is_whole
 
 
 def _tell_resampled(path: Path, index_to_world: AnyArray, lattice: Lattice, *, others: int) -> None:

@@ -12,6 +12,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import IO
@@ -19,6 +20,7 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
+from vnca.bricks.field import Field
 from vnca.errors import FileFormatError, GridError
 from vnca.files import existing_file
 from vnca.io.smoke_format import (
@@ -57,8 +59,8 @@ def read_npz_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
     velocity = None
     if format.velocity_grid != NO_VELOCITY and path.parent.name == "d" and beside.is_dir():
         velocity = _stored_velocity(beside / path.name, domain, box, format.staggered is not False)
-    density = np.ascontiguousarray(density[box.slices(domain)])
-    return StoredSmoke(density, box.lower, np.eye(4), velocity)
+    density = Field.from_dense(density[box.slices(domain)], box.lower)
+    return StoredSmoke(density, np.eye(4), velocity)
 
 
 def npz_smoke_extent(path: Path, format: SmokeFormat) -> Extent:
@@ -114,11 +116,10 @@ def _stored_velocity(path: Path, domain: Box, box: Box, staggered: bool) -> Stor
         )
     whole = upper_grown(box)
     inside = whole.intersection(domain)
-    result = np.zeros((*whole.shape, 3), np.float32)
-    stored = np.zeros(whole.shape, np.bool_)
-    result[inside.slices(whole)] = values[inside.slices(domain)]
-    stored[inside.slices(whole)] = True
-    return StoredVelocity(result, stored, (staggered, staggered, staggered))
+    result = Field.from_dense(values[inside.slices(domain)], inside.lower)
+    stored = Field.from_dense(np.ones(inside.shape, bool), inside.lower)
+    faces = (staggered, staggered, staggered)
+    return StoredVelocity(replace(result, box=whole), replace(stored, box=whole), faces)
 
 
 def _ours(path: Path, values: AnyArray) -> FloatArray:

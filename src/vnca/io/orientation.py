@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Literal, TypeAlias
 
-from vnca.lattice import Lattice, Placement, require_room, upright_turn
+from vnca.lattice import Lattice, Placement, upright_turn
 from vnca.typing import AnyArray
 from vnca.volume import Volume
 
@@ -53,18 +53,12 @@ def on_lattice(smoke: Volume, lattice: Lattice, what: str) -> Volume:
         return replace(smoke, origin=(0, 0, 0), index_to_world=lattice.to_world)
     place = Placement.between(smoke.index_to_world, lattice.to_world, smoke.box, what)
     over = place.box(smoke.box)
-    if not place.is_whole:
-        require_room(over, what)
-    velocity = smoke.velocity
+    velocity = smoke.velocity_field
     if velocity is not None:
-        velocity = place.vectors(place.array(velocity, smoke.box, over, "nearest"))
-    return Volume(
-        place.array(smoke.density, smoke.box, over),
-        velocity,
-        over.lower,
-        lattice.to_world,
-        smoke.frame,
-    )
+        velocity = place.field(velocity, over, "nearest")
+        velocity = replace(velocity, values=place.vectors(velocity.values))
+    density = place.field(smoke.density_field, over)
+    return Volume.of_fields(density, velocity, lattice.to_world, smoke.frame)
 
 
 def on_one_lattice(frames: Iterable[Volume]) -> Iterator[Volume]:

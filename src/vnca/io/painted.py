@@ -1,11 +1,12 @@
 """Writing smoke as VDB files: painted frames of a sequence, and simulated ones."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from vnca.bricks.field import Field
 from vnca.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.io.npz import read_npz_smoke
 from vnca.io.orientation import UpAxis, on_lattice, own_cells, upright_world
@@ -14,7 +15,7 @@ from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, open_vdb, writ
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
 from vnca.lattice import Lattice, Placement
-from vnca.typing import AnyArray, BoolArray, Box, FloatArray
+from vnca.typing import Box, FloatArray
 from vnca.volume import Volume, refined_transform
 
 COLOUR_GRIDS = ("Cd",)
@@ -26,8 +27,8 @@ def write_painted(
     source: Path,
     format: SmokeFormat,
     *,
-    density: FloatArray,
-    colour: FloatArray,
+    density: FloatArray | Field,
+    colour: FloatArray | Field,
     box: Box,
     lattice: Lattice | None = None,
     colour_grids: Sequence[str] = COLOUR_GRIDS,
@@ -46,8 +47,8 @@ def write_painted(
         path: The VDB file to write.
         source: The frame that was painted.
         format: How the frame was read.
-        density: `[x, y, z]` over `box`, in the units of the source.
-        colour: `[x, y, z, 3]` over `box`, linear RGB.
+        density: `[x, y, z]` over `box`, in the units of the source; an array or a field.
+        colour: `[x, y, z, 3]` over `box`, linear RGB; an array or a field.
         box: Cells covered by the arrays: at least those of the source's density.
         lattice: Whose cells these are, if `refine` is 1; those that `read_smoke` gives without one
             unless given.
@@ -69,7 +70,11 @@ def write_painted(
     if len(set(names)) < len(names):
         raise OptionError(f"colour_grids: expected names of their own, got {', '.join(names)}")
     _require_vdb(path)
-    frame = _Painting(density, colour, box, lattice, up_axis_of(source, format), refine)
+    if not isinstance(density, Field):
+        density = Field.from_dense(density, box.lower)
+    if not isinstance(colour, Field):
+        colour = Field.from_dense(colour, box.lower)
+    frame = _Painting(density, colour, lattice, up_axis_of(source, format), refine)
     write = _paint_npz if source.suffix.lower() == ".npz" else _paint_vdb
     write(path, source, format, frame, colour_grids)
 
@@ -85,27 +90,15 @@ def write_smoke(path: Path, volume: Volume) -> None:
     """
     _require_vdb(path)
     transform = Transform.from_matrix(volume.index_to_world)
-    active = volume.density > 0
+    density, velocity = volume.density_field, volume.velocity_field
+    active = replace(density, values=density.values > 0, outside=False).trimmed()
     grids = [
-        Grid.from_dense(
-            "density",
-            volume.density,
-            active,
-            volume.origin,
-            transform=transform,
-            grid_class="fog volume",
-        )
+        Grid.from_fields("density", density, active, transform=transform, grid_class="fog volume")
     ]
-    if volume.velocity is not None:
+    if velocity is not None:
+        units = {UNITS_METADATA: CELLS_PER_FRAME}
         grids.append(
-            Grid.from_dense(
-                "velocity",
-                volume.velocity,
-                active,
-                volume.origin,
-                transform=transform,
-                metadata={UNITS_METADATA: CELLS_PER_FRAME},
-            )
+            Grid.from_fields("velocity", velocity, active, transform=transform, metadata=units)
         )
     write_vdb(path, grids)
 
@@ -137,71 +130,71 @@ def read_colour(
         place = Placement.between(own, ours, cells, what)
         if place.is_whole:
             cells = place.inverse.box(box)
-        values, active = stored.to_dense(cells, fill=0)
-    values = place.array(values.astype(np.float32), cells, box)
+        stored, active = stored.fields(cells)
+    values = place.field(replace(stored, values=stored.values.astype(np.float32)), box)
     if not place.is_whole:
         # Between a colour and nothing lies that colour.
-        share = place.array(active.astype(np.float32), cells, box)[..., None]
-        np.divide(values, share, out=values, where=share > 0)
-    return values
+        share = place.field(replace(active, values=active.values.astype(np.float32)), box)
+        share = share.blocks(values.bricks)[..., None]
+        np.divide(values.values, share, out=values.values, where=share > 0)
+    return values.dense(box)
 
 
 @dataclass(frozen=True, eq=False)
 class _Painting:
-    """Painted arrays, and where their cells lie.
+    """What was painted, and where its cells lie.
 
     Attributes:
-        density: `[x, y, z]` over `box`.
-        colour: `[x, y, z, 3]` over `box`.
-        box: Their cells, `refine` times as fine as those of the lattice.
+        density: Of cells `refine` times as fine as those of the lattice.
+        colour: Of the same cells.
         lattice: None for those of the source, along our axes.
         up: Which axis of the source's world points up.
         refine: How fine they are.
     """
 
-    density: FloatArray
-    colour: FloatArray
-    box: Box
+    density: Field
+    colour: Field
     lattice: Lattice | None
     up: UpAxis
     refine: int
 
-    def in_file(
-        self, transform: Transform, density: AnyArray, cells: Box, what: str
-    ) -> tuple[FloatArray, FloatArray, Box]:
-        """Density and colour of the file's cells, or as fine ones, and which these are.
+    def in_file(self, transform: Transform, density: Field, what: str) -> tuple[Field, Field]:
+        """Density and colour of the file's cells, or as fine ones.
 
         Args:
             transform: Of the file's cells.
             density: Theirs before they were painted, as the file has it.
-            cells: Which they are.
             what: What a message calls them.
 
         Raises:
             ShapeError: If some of them were not painted.
         """
-        world = upright_world(transform.index_to_world, self.up)
+        world, cells = upright_world(transform.index_to_world, self.up), density.box
         ours = own_cells(world, what)[1]
         if self.lattice is not None and not cells.is_empty:
             ours = self.lattice.to_world
         needed = Placement.between(world, ours, cells, what).box(cells).refined(self.refine)
-        if self.box.union(needed) != self.box:
-            raise ShapeError(f"{what}: smoke in {needed}, but only {self.box} was painted")
+        painted = self.density.box
+        if painted.union(needed) != painted:
+            raise ShapeError(f"{what}: smoke in {needed}, but only {painted} was painted")
         over = cells.refined(self.refine)
         source, target = (refined_transform(matrix, self.refine) for matrix in (world, ours))
         back = Placement.between(source, target, over, what).inverse
-        colour = back.array(self.colour, self.box, over, "nearest")
+        colour = back.field(self.colour, over, "nearest")
         if back.is_whole:
-            return back.array(self.density, self.box, over), colour, over
-        positive = np.maximum(density.astype(np.float32), 0)
-        plain = Volume(positive, None, cells.lower, world, 0)
+            return back.field(self.density, over), colour
+        positive = np.maximum(density.values.astype(np.float32), 0)
+        plain = Volume.of_fields(replace(density, values=positive), None, world, 0)
         factor = self._factor(on_lattice(plain, Lattice(ours), what).refined(self.refine))
-        factor = back.array(factor, self.box, over, "nearest")
-        return plain.refined(self.refine).density * factor, colour, over
+        factor = back.field(factor, over, "nearest")
+        finer = plain.refined(self.refine).density_field
+        return replace(finer, values=finer.values * factor.blocks(finer.bricks)), colour
 
-    def active(self, density: FloatArray, of_file: BoolArray) -> BoolArray:
+    def active(self, density: Field, of_file: Field) -> Field:
         """Which cells to store; `of_file` are active in the file."""
-        return of_file if self.refine == 1 else density != 0
+        if self.refine == 1:
+            return of_file
+        return replace(density, values=density.values != 0, outside=False).trimmed()
 
     def transform(self, of_file: Transform) -> Transform:
         """That of the painted cells; `of_file` is that of the file's."""
@@ -209,13 +202,12 @@ class _Painting:
             return of_file
         return Transform.from_matrix(refined_transform(of_file.index_to_world, self.refine))
 
-    def _factor(self, plain: Volume) -> FloatArray:
-        """Over `box`, what the painting multiplied the density by; 1 where there was none."""
-        factor = np.ones_like(self.density)
-        inside = plain.box.slices(self.box)
-        before = plain.density
-        np.divide(self.density[inside], before, out=factor[inside], where=before > 0)
-        return factor
+    def _factor(self, plain: Volume) -> Field:
+        """What the painting multiplied the density by; 1 where there was none."""
+        before = plain.density_field
+        factor, painted = np.ones_like(before.values), self.density.blocks(before.bricks)
+        np.divide(painted, before.values, out=factor, where=before.values > 0)
+        return Field(before.bricks, factor, self.density.box, outside=1.0)
 
 
 def _paint_vdb(
@@ -224,26 +216,27 @@ def _paint_vdb(
     with open_vdb(source) as file:
         header, old, cells = read_density(file, format)
         what = f"{source}: grid {header.name!r}"
-        before, active = old.to_dense(cells, fill=0)
-        density, colour, box = frame.in_file(old.transform, before, cells, what)
-        del before
+        before, active = old.fields(cells)
+        density, colour = frame.in_file(old.transform, before, what)
         active = frame.active(density, active)
-        transform, origin = frame.transform(old.transform), box.lower
+        transform = frame.transform(old.transform)
         dtype = VALUE_TYPES[old.value_type].dtype
         if dtype.kind != "f":
             dtype = np.dtype(np.float32)
         if old.is_half or dtype.itemsize == 2:
-            density, colour = (np.clip(a, -_HALF_MOST, _HALF_MOST) for a in (density, colour))
-        new = Grid.from_dense(
-            old.name, density.astype(dtype), active, origin, like=old, transform=transform
-        )
+            density, colour = (
+                replace(field, values=np.clip(field.values, -_HALF_MOST, _HALF_MOST))
+                for field in (density, colour)
+            )
+        density = replace(density, values=density.values.astype(dtype))
+        new = Grid.from_fields(old.name, density, active, like=old, transform=transform)
         grids: list[Grid | GridHeader] = [
             new if name == header.name else other
             for name, other in file.grids.items()
             if name == header.name or decoded(other.grid_name) not in colour_grids
         ]
         grids += [
-            Grid.from_dense(name, colour, active, origin, like=old, transform=transform)
+            Grid.from_fields(name, colour, active, like=old, transform=transform)
             for name in colour_grids
         ]
         write_vdb(path, grids, metadata=file.metadata)
@@ -254,14 +247,14 @@ def _paint_npz(
 ) -> None:
     stored = read_npz_smoke(source, format)
     transform = Transform.from_matrix(stored.index_to_world)
-    density, colour, box = frame.in_file(transform, stored.density, stored.box, str(source))
-    active = frame.active(density, stored.density != 0)
+    before = stored.density
+    density, colour = frame.in_file(transform, before, str(source))
+    active = frame.active(density, replace(before, values=before.values != 0, outside=False))
     grids = [
-        Grid.from_dense(
+        Grid.from_fields(
             name,
             values,
             active,
-            box.lower,
             transform=frame.transform(transform),
             grid_class="fog volume",
         )
@@ -272,11 +265,10 @@ def _paint_npz(
     ]
     if (velocity := stored.velocity) is not None:
         grids.append(
-            Grid.from_dense(
+            Grid.from_fields(
                 "velocity",
                 velocity.values,
                 velocity.stored,
-                stored.origin,
                 transform=transform,
                 grid_class="staggered" if all(velocity.staggered) else None,
             )

@@ -11,6 +11,7 @@ from statistics import median
 
 import numpy as np
 
+from vnca.bricks.field import Field
 from vnca.errors import FileFormatError, GridError, OptionError, SequenceError
 from vnca.files import existing_file
 from vnca.io.npz import npz_smoke_extent, read_npz_smoke
@@ -21,7 +22,7 @@ from vnca.io.smoke_format import Extent, SmokeFormat, StoredSmoke, StoredVelocit
 from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_extent
 from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
 from vnca.lattice import Lattice, Placement
-from vnca.typing import AnyArray, Box, FloatArray
+from vnca.typing import AnyArray, Box
 from vnca.volume import Volume
 
 __all__ = [
@@ -86,11 +87,10 @@ def read_smoke(
     density = _non_negative(stored.density, path)
     velocity = None if stored.velocity is None else _velocity(stored.velocity, stored, format)
     place, index_to_world = _upright(stored.index_to_world, path, format)
-    box = place.box(stored.box)
     if velocity is not None:
-        velocity = place.vectors(place.array(velocity, stored.box, box))
-    density = place.array(density, stored.box, box)
-    smoke = Volume(density, velocity, box.lower, index_to_world, frame)
+        velocity = place.field(velocity)
+        velocity = replace(velocity, values=place.vectors(velocity.values))
+    smoke = Volume.of_fields(place.field(density), velocity, index_to_world, frame)
     return smoke if lattice is None else on_lattice(smoke, lattice, place.what)
 
 
@@ -179,14 +179,14 @@ def _reader(path: Path) -> Reader:
         ) from None
 
 
-def _non_negative(density: FloatArray, path: Path) -> FloatArray:
-    least, most = float(density.min(initial=0)), float(density.max(initial=0))
+def _non_negative(density: Field, path: Path) -> Field:
+    least, most = float(density.values.min(initial=0)), float(density.values.max(initial=0))
     if least < -NEGATIVE_TOLERANCE * most:
         raise GridError(
             f"{path}: density goes from {least:g} to {most:g}; expected none below zero; "
             "choose another grid with --density-grid"
         )
-    return np.maximum(density, 0, out=density)
+    return replace(density, values=np.maximum(density.values, 0))
 
 
 def _to_cells_per_frame(smoke: StoredSmoke, format: SmokeFormat) -> AnyArray:
@@ -206,14 +206,12 @@ def _to_cells_per_frame(smoke: StoredSmoke, format: SmokeFormat) -> AnyArray:
     return matrix
 
 
-def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat) -> FloatArray:
+def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat) -> Field:
     """Velocity at the centres of the density's cells, cells/frame, in the file's axes."""
     matrix = _to_cells_per_frame(smoke, format)  # refuses bad options, needed or not
     if velocity.in_cells_per_frame:
         matrix = np.eye(3)
-    values = centred(velocity.values, velocity.stored, velocity.staggered)
-    known = velocity.stored[:-1, :-1, :-1]
+    found, known = centred(velocity.values, velocity.stored, velocity.staggered)
     if not np.array_equal(matrix, np.eye(3)):
-        values[known] = values[known] @ matrix.T.astype(np.float32)
-    values, _ = extrapolated(values, known, EXTRAPOLATED_CELLS)
-    return values
+        found.values[known.values] = found.values[known.values] @ matrix.T.astype(np.float32)
+    return extrapolated(found, known, EXTRAPOLATED_CELLS)[0]

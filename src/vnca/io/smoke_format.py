@@ -6,10 +6,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from vnca.bricks.field import Field
 from vnca.errors import GridError
 from vnca.io.orientation import UpAxis
 from vnca.io.velocity import VelocityUnits
-from vnca.typing import AnyArray, BoolArray, Box, FloatArray, Index
+from vnca.typing import AnyArray, BoolArray, Box, FloatArray
 
 NO_VELOCITY = "none"
 # What a velocity grid's metadata says of its units, where it was written by vnca.
@@ -56,14 +57,14 @@ class StoredVelocity:
     """Velocity as a file has it, with one layer of cells more than the density at upper ends.
 
     Attributes:
-        values: `[x + 1, y + 1, z + 1, 3]`, in the file's units.
-        stored: `[x + 1, y + 1, z + 1]`, which cells the file has.
+        values: `[..., 3]`, in the file's units.
+        stored: Which cells the file has.
         staggered: Which components lie on the lower faces of their cells.
         in_cells_per_frame: Whether the file itself says so; units and scale then do not count.
     """
 
-    values: FloatArray
-    stored: BoolArray
+    values: Field
+    stored: Field
     staggered: tuple[bool, bool, bool]
     in_cells_per_frame: bool = False
 
@@ -77,25 +78,17 @@ class Extent(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StoredSmoke:
-    """Smoke as a file has it, in the file's axes, over the box of its density.
+    """Smoke as a file has it, in the file's axes.
 
     Attributes:
-        density: `[x, y, z]`, finite.
-        origin: Index coordinates of cell `[0, 0, 0]`.
+        density: Over the box of its cells, finite.
         index_to_world: 4×4.
         velocity: None where the file has none, or it is not wanted.
     """
 
-    density: FloatArray
-    origin: Index
+    density: Field
     index_to_world: AnyArray
     velocity: StoredVelocity | None
-
-    @property
-    def box(self) -> Box:
-        """The cells of the density."""
-        x, y, z = (o + n for o, n in zip(self.origin, self.density.shape, strict=True))
-        return Box(self.origin, (x, y, z))
 
 
 def up_axis_of(path: Path, format: SmokeFormat) -> UpAxis:
@@ -109,8 +102,16 @@ def upper_grown(box: Box) -> Box:
     return Box(box.lower, (x + 1, y + 1, z + 1))
 
 
-def single_precision(values: AnyArray, path: Path, what: str) -> FloatArray:
+def single_precision(
+    values: AnyArray, path: Path, what: str, *, stored: BoolArray | None = None
+) -> FloatArray:
     """`values` as float32, all of them finite.
+
+    Args:
+        values: Any numbers.
+        path: Where they are from, for the message.
+        what: What they are, for the message.
+        stored: Which of them the message counts: those the file has; all unless given.
 
     Raises:
         GridError: If any is NaN or infinite, or too large for float32.
@@ -122,7 +123,8 @@ def single_precision(values: AnyArray, path: Path, what: str) -> FloatArray:
         if np.isfinite(np.sum(values, dtype=np.float64)):
             return values
     bad = values.size - int(np.count_nonzero(np.isfinite(values)))
+    count = values.size if stored is None else values[stored].size
     raise GridError(
-        f"{path}: {what}: {bad} of {values.size} values are NaN, infinite or beyond float32; "
+        f"{path}: {what}: {bad} of {count} values are NaN, infinite or beyond float32; "
         "simulate the frame again or leave it out with --frames"
     )

@@ -1,11 +1,13 @@
 """Smoke in OpenVDB files: which grids it is, and whether they fit together."""
 
-import math
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from vnca.bricks.field import Field
+from vnca.bricks.places import bricks_beside, sorted_bricks
 from vnca.errors import FileFormatError, GridError
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
@@ -19,12 +21,12 @@ from vnca.io.smoke_format import (
     upper_grown,
 )
 from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, VdbFile, open_vdb
-from vnca.typing import BoolArray, Box, FloatArray
+from vnca.typing import Box, IntArray
 
 VELOCITY_NAMES = ("velocity", "vel", "v")
 _AXES = "xyz"
 _CELL_TOLERANCE = 1e-3
-# A small file may want arrays of 512³ cells, one of 500 KB the most there are (2³¹).
+# A small file may hold 512³ cells, in tiles or packed well, one of 500 KB 2³¹.
 MOST_CELLS, MOST_CELLS_A_BYTE = 2**27, 2**12
 
 
@@ -38,14 +40,12 @@ def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
         GridError: If grids are missing, of the wrong kind, or do not fit together.
     """
     with open_vdb(path) as file:
-        header, density, box = read_density(file, format)
-        values, active = density.to_dense(box, fill=0)
-        del density, active
+        header, grid, box = read_density(file, format)
+        density, _ = _finite(header, grid, box)
         return StoredSmoke(
-            single_precision(values, path, f"grid {header.name!r}"),
-            box.lower,
+            density,
             header.transform.index_to_world,
-            _read_velocity(file, format, box, header.transform),
+            _read_velocity(file, format, density, header.transform),
         )
 
 
@@ -88,7 +88,7 @@ def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, 
 
     Raises:
         FileFormatError: If it is truncated or corrupt.
-        GridError: If it is missing, of the wrong kind, or too sparse to be put into an array.
+        GridError: If it is missing, of the wrong kind, or has more active cells than fit.
     """
     header = density_header(file, format)
     label = f"{file.path}: grid {header.name!r}"
@@ -96,31 +96,37 @@ def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, 
     box = grid.active_box()
     if header.box is not None and header.box.union(box) != header.box:
         raise FileFormatError(f"{label} has active cells outside the box its metadata gives")
-    if math.prod(box.shape) > max(MOST_CELLS, header.stored_bytes * MOST_CELLS_A_BYTE):
+    if grid.held_cells > max(MOST_CELLS, header.stored_bytes * MOST_CELLS_A_BYTE):
         raise GridError(
-            f"{label}: {grid.active_voxels} active cells are scattered over {_extent(box)}, too "
-            "many to hold; remove those that stray, or resample the grid"
+            f"{label}: {grid.active_voxels} active cells in {_extent(box)} are too many to hold; "
+            "make inactive what is no smoke, or resample the grid"
         )
     return header, grid, box
 
 
 def _read_velocity(
-    file: VdbFile, format: SmokeFormat, box: Box, density: Transform
+    file: VdbFile, format: SmokeFormat, density: Field, place: Transform
 ) -> StoredVelocity | None:
     headers = _velocity_headers(file, format)
     if not headers:
         return None
     # A vector grid has one transform for all components, a scalar one its own.
     axes = (None,) if len(headers) == 1 else (0, 1, 2)
-    faces = [_is_on_faces(h, axis, format, density) for h, axis in zip(headers, axes, strict=True)]
-    parts = [_dense(header, box) for header in headers]
+    faces = [_is_on_faces(h, axis, format, place) for h, axis in zip(headers, axes, strict=True)]
+    parts = [_around(header, density) for header in headers]
     if len(headers) == 1:
         told = headers[0].metadata.value(UNITS_METADATA) == CELLS_PER_FRAME
         return StoredVelocity(*parts[0], (faces[0], faces[0], faces[0]), told)
-    values = np.stack([part for part, _ in parts], axis=-1)
+    whole = parts[0][0].box
+    bricks = sorted_bricks(np.concatenate([active.bricks for _, active in parts]))
+    values = np.stack([part.blocks(bricks) for part, _ in parts], axis=-1)
     # A component that is zero everywhere may not be stored at all.
-    stored = np.logical_or.reduce([active for _, active in parts])
-    return StoredVelocity(values, stored, (faces[0], faces[1], faces[2]))
+    stored = np.logical_or.reduce([active.blocks(bricks) for _, active in parts])
+    return StoredVelocity(
+        Field(bricks, values, whole),
+        Field(bricks, stored, whole, outside=False),
+        (faces[0], faces[1], faces[2]),
+    )
 
 
 def _velocity_headers(file: VdbFile, format: SmokeFormat) -> list[GridHeader]:
@@ -175,21 +181,34 @@ def _is_on_faces(
     return is_shifted or header.grid_class == "staggered"
 
 
-def _dense(header: GridHeader, box: Box) -> tuple[FloatArray, BoolArray]:
-    """Values over `box` with one layer more at upper ends, zero where inactive, and what is active.
+def _around(header: GridHeader, density: Field) -> tuple[Field, Field]:
+    """Values with one layer more than the density at upper ends, and which cells are active.
 
     Raises:
         GridError: If the grid holds cells, but none of those.
     """
-    grid, whole = header.read(), upper_grown(box)
-    there = grid.active_box()
+    grid, box = header.read(), density.box
+    whole, there = upper_grown(box), grid.active_box()
     if not there.is_empty and not box.is_empty and there.intersection(whole).is_empty:
         raise GridError(
             f"{header.source.path}: velocity grid {header.name!r} covers {_extent(there)}, the "
             f"density {_extent(box)}: they do not meet"
         )
-    values, active = grid.to_dense(whole, fill=0)
-    return single_precision(values, header.source.path, f"grid {header.name!r}"), active
+    return _finite(header, grid, whole, near=bricks_beside(density.bricks))
+
+
+def _finite(
+    header: GridHeader, grid: Grid, box: Box, *, near: IntArray | None = None
+) -> tuple[Field, Field]:
+    """Values of a grid in a box, zero where inactive, and which cells are active.
+
+    Raises:
+        GridError: If one is NaN or infinite, or too large for float32.
+    """
+    values, active = grid.fields(box, near=near)
+    what = f"grid {header.name!r}"
+    found = single_precision(values.values, header.source.path, what, stored=active.values)
+    return replace(values, values=found), active
 
 
 def _components(header: GridHeader) -> int | None:

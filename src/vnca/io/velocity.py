@@ -1,12 +1,16 @@
 """Velocity as files have it, made into cells per frame at cell centres in and near the smoke."""
 
+from dataclasses import replace
 from itertools import product
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from vnca.bricks.field import Field
+from vnca.bricks.growth import dilated
+from vnca.bricks.places import CELLS, EDGE
 from vnca.errors import BackendUnavailableError, GridError, OptionError
-from vnca.typing import AnyArray, BoolArray, Box, FloatArray
+from vnca.typing import AnyArray, Box
 from vnca.volume import Volume
 
 VelocityUnits: TypeAlias = Literal["cells/frame", "m/s", "mantaflow"]
@@ -22,82 +26,95 @@ _FIT_CHANGE, _FIT_TOLERANCE = 0.05, 0.1
 
 
 def centred(
-    velocity: FloatArray,
-    stored: BoolArray,
+    velocity: Field,
+    stored: Field,
     staggered: tuple[bool, bool, bool] = (True, True, True),
-) -> FloatArray:
+) -> tuple[Field, Field]:
     """Velocity on lower faces, averaged to cell centres.
 
     Component `a` of cell `i` lies on the face towards `i - 1` along axis `a`; the face on the
     other side belongs to the next cell. Where that one is not stored, the lower face alone counts.
 
     Args:
-        velocity: `[x, y, z, 3]`, with one layer of cells more than is wanted at each upper end.
-        stored: `[x, y, z]`, which cells have a velocity.
+        velocity: `[..., 3]`, with one layer of cells more than is wanted at each upper end.
+        stored: Which cells have a velocity.
         staggered: Which components lie on faces; the others are at centres already.
 
     Returns:
-        `[x - 1, y - 1, z - 1, 3]`, zero where nothing is stored.
+        The velocity without those layers, zero where nothing is stored, and which cells are.
     """
-    x, y, z = (cells - 1 for cells in stored.shape)
-    result = np.zeros((x, y, z, 3), np.float32)
-    # Smoke fills a small part of its box: look at those cells only.
-    cells = np.nonzero(stored[:-1, :-1, :-1])
-    at_centres = velocity[cells]
+    x, y, z = velocity.box.upper
+    box = Box(velocity.box.lower, (x - 1, y - 1, z - 1))
+    faces = replace(velocity, bricks=stored.bricks, values=velocity.blocks(stored.bricks))
+    faces.values[~stored.values] = 0
+    result = faces.values.copy()
     for axis in range(3):
         if staggered[axis]:
-            upper = tuple(index + (a == axis) for a, index in enumerate(cells))
-            is_there = stored[upper]
-            mean = 0.5 * (at_centres[:, axis] + velocity[(*upper, axis)])
-            at_centres[is_there, axis] = mean[is_there]
-    result[cells] = at_centres
-    return result
+            lower = replace(faces, values=faces.values[..., axis])
+            mean = 0.5 * (lower.values + lower.shifted(axis, 1))
+            both = stored.values & stored.shifted(axis, 1)
+            result[..., axis] = np.where(both, mean, lower.values)
+    return replace(faces, values=result).within(box), stored.within(box)
 
 
-def extrapolated(
-    velocity: FloatArray, known: BoolArray, layers: int
-) -> tuple[FloatArray, BoolArray]:
+def extrapolated(values: Field, known: Field, layers: int) -> tuple[Field, Field]:
     """Velocity, or any vectors, continued from known cells outwards, layer by layer.
 
     A cell becomes the mean of those of its six neighbours that were known a layer before, so
     a constant velocity is continued exactly.
 
     Args:
-        velocity: `[x, y, z, 3]`.
-        known: `[x, y, z]`.
+        values: `[..., 3]`.
+        known: Where they are known, in the same box.
         layers: How many cells far.
 
     Returns:
-        The velocity, zero where it is still unknown, and where it is known now.
+        The values, zero where they are still unknown, and where they are known now.
     """
-    result, filled = np.where(known[..., None], velocity, velocity.dtype.type(0)), known.copy()
-    # The same laid out flat, where a list of cells is much quicker to fetch.
-    values, is_filled = result.reshape(-1, 3), filled.reshape(-1)
+    reached = dilated(known, layers)
+    box, bricks = reached.box, reached.bricks
+    inside = replace(reached, values=np.ones_like(reached.values), outside=False).within(box).values
+    filled = replace(known, bricks=bricks, values=known.blocks(bricks))
+    result = values.blocks(bricks)
+    result[~filled.values] = 0
+    # The same laid out flat, where a list of cells is much quicker to fetch; and nothing behind.
+    flat = np.concatenate([result.reshape(-1, 3), np.zeros((CELLS, 3), result.dtype)])
+    is_filled = np.concatenate([filled.values.reshape(-1), np.zeros(CELLS, bool)])
+    filled = replace(filled, values=is_filled[:-CELLS].reshape(filled.values.shape))
+    beside = {
+        (axis, step): filled.places.find(bricks + step * np.eye(3, dtype=np.int32)[axis]) * CELLS
+        for axis, step in product(range(3), (-1, 1))
+    }
     for _ in range(layers):
-        front = np.flatnonzero(_rim(filled) & ~filled)
+        rim = np.logical_or.reduce([filled.shifted(*way) for way in beside])
+        front = np.flatnonzero(rim & inside & ~filled.values)
         # In double precision the sum of up to six equal floats is exact.
         total, count = np.zeros((len(front), 3)), np.zeros(len(front))
-        places = np.unravel_index(front, known.shape)
-        for axis, step in product(range(3), (-1, 1)):
-            # At the edge of the array a cell is its own neighbour: not filled, and zero.
-            place = [at + step * (a == axis) for a, at in enumerate(places)]
-            beside = np.ravel_multi_index(place, known.shape, mode="clip")
-            total += values.take(beside, axis=0)
-            count += is_filled.take(beside)
-        values[front] = total / count[:, None]
+        for way, bricks_there in beside.items():
+            there = _next_cells(front, *way, bricks_there)
+            total += flat.take(there, axis=0)
+            count += is_filled.take(there)
+        flat[front] = total / count[:, None]
         is_filled[front] = True
-    return result, filled
+    found = flat[:-CELLS].reshape(result.shape)
+    return Field(bricks, found, box), filled
 
 
-def _rim(known: BoolArray) -> BoolArray:
-    """Cells with a known neighbour."""
-    rim = np.zeros_like(known)
-    for axis in range(3):
-        lower = tuple(slice(None, -1) if a == axis else slice(None) for a in range(3))
-        upper = tuple(slice(1, None) if a == axis else slice(None) for a in range(3))
-        rim[lower] |= known[upper]
-        rim[upper] |= known[lower]
-    return rim
+def _next_cells(cells: AnyArray, axis: int, step: int, beside: AnyArray) -> AnyArray:
+    """Flat places of the cells next to some, by their flat places.
+
+    Args:
+        cells: `[n]`.
+        axis: Along which axis.
+        step: 1 up or -1 down.
+        beside: Flat place `[m]` of the first cell of the brick beside each.
+    """
+    stride = EDGE ** (2 - axis)
+    at_end = (cells // stride) % EDGE == (EDGE - 1 if step > 0 else 0)
+    result = cells + step * stride
+    leaving = cells[at_end]
+    result[at_end] = beside[leaving // CELLS] + leaving % CELLS - step * (EDGE - 1) * stride
+    return result
 
 
 def cells_per_frame(
@@ -153,12 +170,14 @@ def fit_velocity_scale(first: Volume, second: Volume) -> float:
         raise BackendUnavailableError(
             "velocity_scale: fitting needs scipy, which is not installed: pip install 'vnca[train]'"
         ) from error
-    if first.velocity is None:
+    moving = first.velocity_field
+    if moving is None:
         raise GridError(f"frame {first.frame}: no velocity to fit a scale to")
     box = first.box.union(second.box).grown(1)
-    before, after = _within(first.density, first.box, box), _within(second.density, second.box, box)
-    velocity = _within(first.velocity, first.box, box)
-    velocity, _ = extrapolated(velocity, np.asarray(velocity.any(axis=-1)), _FIT_LAYERS)
+    before, after = first.density_field.dense(box), second.density_field.dense(box)
+    moving = replace(moving, box=box)
+    known = replace(moving, values=moving.values.any(axis=-1), outside=False)
+    velocity = extrapolated(moving, known, _FIT_LAYERS)[0].dense()
     unit = max(before.max(), after.max())
     where = np.nonzero(np.abs(after - before) > _FIT_CHANGE * unit)
     wanted, here = after[where], np.stack(where).astype(np.float32)
@@ -185,10 +204,3 @@ def fit_velocity_scale(first: Volume, second: Volume) -> float:
     bounds = tried[best - 1], tried[best + 1]
     fit: Any = optimize.minimize_scalar(mismatch, bounds=bounds, method="bounded")
     return float(fit.x)
-
-
-def _within(array: AnyArray, box: Box, whole: Box) -> AnyArray:
-    """`array`, which covers `box`, in an array of zeros that covers `whole`."""
-    result = np.zeros((*whole.shape, *array.shape[3:]), array.dtype)
-    result[box.slices(whole)] = array
-    return result

@@ -10,6 +10,7 @@ Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from vnca.automaton.paint import colours, density_factors
 from vnca.automaton.priors import priors
 from vnca.automaton.rule import SMOKE_THRESHOLD, Rule
 from vnca.automaton.stepper import Step
+from vnca.bricks.dense import dense, field_of
 from vnca.bricks.field import Field
 from vnca.io.orientation import on_one_lattice
 from vnca.io.velocity import extrapolated
@@ -55,15 +57,17 @@ class RollState:
         return cls(cells, np.zeros((1, channels), dtype=np.float32), steps_done)
 
 
+@dense("density", "colour")
 @dataclass(frozen=True, eq=False)
 class Painting:
     """One painted frame, on the same cells as its smoke.
 
     Attributes:
         smoke: The frame as it was read.
-        density: `[x, y, z]`, painted, in the units of the file.
-        colour: Linear RGB `[x, y, z, 3]`; beside the living cells continued from them, white
-            farther away.
+        density: `[x, y, z]`, painted, in the units of the file; the array is made when it is asked
+            for, as the smoke's is.
+        colour: Likewise, linear RGB `[x, y, z, 3]`; beside the living cells continued from them,
+            white farther away.
         state: What it leaves to the next frame.
     """
 
@@ -71,6 +75,25 @@ class Painting:
     density: FloatArray
     colour: FloatArray
     state: RollState
+
+    @classmethod
+    def of_fields(
+        cls, smoke: Volume, density: Field, colour: Field, state: RollState
+    ) -> "Painting":
+        """A painting given by where there is smoke and colour."""
+        painted: Any = density
+        coloured: Any = colour
+        return cls(smoke, painted, coloured, state)
+
+    @cached_property
+    def density_field(self) -> Field:
+        """The density where there is any."""
+        return field_of(self, "density", self.smoke.origin)
+
+    @cached_property
+    def colour_field(self) -> Field:
+        """The colour where it is not white."""
+        return field_of(self, "colour", self.smoke.origin, outside=UNPAINTED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +149,7 @@ class Roll:
         domain = self._domain(smoke)
         if len(domain) == 0:
             state = RollState.empty(rule.config.channels, state.steps_done)
-            return Painting(smoke, smoke.density, _unpainted(smoke), state)
+            return Painting.of_fields(smoke, smoke.density_field, _unpainted(smoke), state)
         steps = self.steps_per_frame
         if len(state.cells) == 0:
             values, steps = domain.seed(rule.config.channels), config.warmup + steps
@@ -146,25 +169,27 @@ class Roll:
 
     def _shown(self, smoke: Volume, state: RollState) -> Painting:
         """The frame as a state shows it."""
-        colour, density = _unpainted(smoke), smoke.density.copy()
-        at = state.cells - np.asarray(smoke.origin, dtype=np.int32)
-        inside = ((at >= 0) & (at < smoke.density.shape)).all(axis=1)
-        where = tuple(at[inside].T)
-        cells = state.values[:-1][inside]
-        colour[where] += self.config.strength * (colours(cells) - UNPAINTED)
-        density[where] *= density_factors(cells, strength=self.config.density_strength)
-        painted = np.zeros(density.shape, dtype=bool)
-        painted[where] = True
-        colour, known = extrapolated(colour, painted, self.fringe)
-        colour[~known] = UNPAINTED
-        return Painting(smoke, density, colour, state)
+        at, box = state.cells, smoke.box
+        inside = ((at >= box.lower) & (at < box.upper)).all(axis=1)
+        at, cells = at[inside], state.values[:-1][inside]
+        painted = UNPAINTED + self.config.strength * (colours(cells) - UNPAINTED)
+        colour = Field.from_cells(at, painted, box, outside=UNPAINTED)
+        known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
+        colour, known = extrapolated(colour, known, self.fringe)
+        colour.values[~known.values] = UNPAINTED
+        factors = Field.from_cells(
+            at, density_factors(cells, strength=self.config.density_strength), box, outside=1.0
+        )
+        density = smoke.density_field
+        density = replace(density, values=density.values * factors.blocks(density.bricks))
+        return Painting.of_fields(smoke, density, replace(colour, outside=UNPAINTED), state)
 
     def _domain(self, smoke: Volume) -> Domain:
         """The cells that live in a frame."""
         if self.domain_kind == "box":
             return self._whole_box
         return Domain.around_smoke(
-            Field.from_dense(smoke.density, smoke.origin),
+            smoke.density_field,
             threshold=SMOKE_THRESHOLD * self.rule.scales.density,
             reach=self.rule.config.reach,
             box=self.box.grown(self.rule.config.reach),
@@ -202,5 +227,6 @@ def stylize(
         yield painting
 
 
-def _unpainted(smoke: Volume) -> FloatArray:
-    return np.full((*smoke.density.shape, 3), UNPAINTED, dtype=np.float32)
+def _unpainted(smoke: Volume) -> Field:
+    nothing = np.empty((0, 3), np.int32), np.empty((0, 3), np.float32)
+    return Field.from_cells(*nothing, smoke.box, outside=UNPAINTED)

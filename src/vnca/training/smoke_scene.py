@@ -13,7 +13,6 @@ from torch import Tensor
 from vnca.automaton.domain import Domain
 from vnca.automaton.priors import DENSITY, VELOCITY, priors, told_velocity
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
-from vnca.bricks.field import Field
 from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable
 from vnca.errors import GridError
 from vnca.render.colour import linear_to_srgb, srgb_to_linear
@@ -90,7 +89,7 @@ class SmokeScene(Scene[SmokeSight]):
             domain = Domain.filling(box)
         else:
             domain = Domain.around_smoke(
-                Field.from_dense(smoke.density, smoke.origin),
+                smoke.density_field,
                 threshold=SMOKE_THRESHOLD * rule.scales.density,
                 reach=rule.config.reach,
                 box=box,
@@ -98,11 +97,11 @@ class SmokeScene(Scene[SmokeSight]):
         super().__init__(domain, priors(domain, smoke, rule), device)
         self.samples = max(domain.box.shape) / view.step
         self.gamma = rule.scales.gamma
-        density = domain.gather(smoke.density, smoke.origin) / rule.scales.density
+        density = smoke.density_field.gather(domain.cells) / rule.scales.density
         self._density = torch.from_numpy(density.astype(np.float32)).to(device)
         velocity = np.zeros((len(domain), 3), dtype=np.float32)
-        if smoke.velocity is not None:
-            velocity[:] = domain.gather(smoke.velocity, smoke.origin)
+        if smoke.velocity_field is not None:
+            velocity[:] = smoke.velocity_field.gather(domain.cells)
         self.moves = bool(velocity.any())
         self.velocity = torch.from_numpy(velocity).to(device)
         self._rule = rule

@@ -6,15 +6,19 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from vnca.bricks.field import Field, as_bricks
+from vnca.bricks.places import covered
 from vnca.errors import GridError
 from vnca.io.vdb.layout import LEAF_CELLS, LEAF_EDGE, VALUE_TYPES, ValueType
 from vnca.io.vdb.metadata import Metadata
 from vnca.io.vdb.transform import Transform
 from vnca.io.vdb.tree import Tiles, Tree
-from vnca.typing import AnyArray, BoolArray, Box, Index
+from vnca.typing import AnyArray, BoolArray, Box, Index, IntArray
 
 EMPTY_BOX = Box((0, 0, 0), (0, 0, 0))
 _MOST_CELLS = 2**31  # a dense array beyond this is a corrupt box, not a wish
+MOST_TILE_CELLS = 2**27
+"""Active tiles of more cells (512³) count only where they are wanted, see `Grid.fields`."""
 
 
 class Described(Protocol):
@@ -59,6 +63,14 @@ class Grid:
         tiles = self.tree.tiles
         edges = tiles.edges[tiles.active].tolist()
         return int(self.tree.leaf_active.sum()) + sum(edge**3 for edge in edges)
+
+    @property
+    def held_cells(self) -> int:
+        """Cells in the bricks of leaves and active tiles: what `fields` take, at most."""
+        tiles = self.tree.tiles
+        return self.tree.leaf_active.size + sum(
+            edge**3 for edge in tiles.edges[tiles.active].tolist()
+        )
 
     def active_box(self) -> Box:
         """The smallest box around the active cells; empty if there are none."""
@@ -126,6 +138,53 @@ class Grid:
             values[~active] = fill
         return values, active
 
+    def fields(self, box: Box, *, near: IntArray | None = None) -> tuple[Field, Field]:
+        """The cells of `box` as fields, which take what leaves and active tiles take.
+
+        Args:
+            box: Any box in index space.
+            near: Bricks near which alone active tiles count, if there they fill more than fits.
+
+        Returns:
+            Values in the grid's own type, zero where inactive, and which cells are active.
+        """
+        tree, edges = self.tree, (LEAF_EDGE,) * 3
+        leaves = tree.leaf_origins // LEAF_EDGE
+        first, last = covered(leaves, box)
+        inside = np.flatnonzero((first < last).all(axis=1))
+        tiles, filled = self._tile_bricks(box, near)
+        bricks = np.concatenate([leaves[inside], filled])
+        order = np.lexsort(bricks.T[::-1])
+        kind = tree.leaf_values.shape[2:]
+        values = np.empty((len(bricks), LEAF_CELLS, *kind), tree.leaf_values.dtype)
+        active = np.empty((len(bricks), LEAF_CELLS), np.bool_)
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        of_leaves, of_tiles = np.split(place, [len(inside)])
+        values[of_leaves], active[of_leaves] = tree.leaf_values[inside], tree.leaf_active[inside]
+        values[of_tiles], active[of_tiles] = tree.tiles.values[tiles, None], True
+        values[~active] = 0
+        shown = Field(bricks[order], values.reshape(-1, *edges, *kind), box).within(box)
+        return shown, Field(bricks[order], active.reshape(-1, *edges), box, False).within(box)
+
+    def _tile_bricks(self, box: Box, near: IntArray | None) -> tuple[AnyArray, IntArray]:
+        """Bricks of active tiles in a box: of which tile `[n]`, and their coordinates `[n, 3]`."""
+        tiles = self.tree.tiles
+        origins = tiles.origins.astype(np.int64)
+        low = np.maximum(origins, box.lower) // LEAF_EDGE
+        high = -(-np.minimum(origins + tiles.edges[:, None], box.upper) // LEAF_EDGE)
+        counts = np.maximum(high - low, 0)
+        counts[~tiles.active] = 0
+        found = np.flatnonzero(counts.all(axis=1))
+        if near is not None and counts[found].prod(axis=1).sum() * LEAF_CELLS > MOST_TILE_CELLS:
+            # Each of those bricks that lie in a tile.
+            at = [((near >= low[tile]) & (near < high[tile])).all(axis=1) for tile in found]
+            bricks = [near[there] for there in at]
+        else:
+            bricks = [low[tile] + np.argwhere(np.ones(counts[tile], bool)) for tile in found]
+        which = np.repeat(found, [len(each) for each in bricks])
+        return which, np.concatenate([np.empty((0, 3), np.int32), *bricks]).astype(np.int32)
+
     def _scatter_leaves(self, values: AnyArray, active: BoolArray, lower: AnyArray) -> None:
         """Write leaves into arrays whose first cell, `lower`, is aligned to leaves."""
         tree, edges = self.tree, (LEAF_EDGE,) * 3
@@ -185,11 +244,43 @@ class Grid:
         Raises:
             GridError: If shapes or type do not fit, or there is no transform.
         """
-        value_type = _value_type_of(name, values, active)
-        if any(
-            abs(start) + cells > 2**31 for start, cells in zip(origin, active.shape, strict=True)
-        ):
-            raise GridError(f"grid {name!r}: cells from {origin} leave the range of 32-bit indices")
+        if active.dtype != np.bool_ or active.ndim != 3 or values.shape[:3] != active.shape:
+            raise GridError(
+                f"grid {name!r}: values {values.shape} need a boolean mask of their cells, "
+                f"got {active.dtype} {active.shape}"
+            )
+        return cls.from_fields(
+            name,
+            Field.from_dense(values, origin, held=active),
+            Field.from_dense(active, origin, outside=False),
+            like=like,
+            transform=transform,
+            metadata=metadata,
+            background=background,
+            half=half,
+            grid_class=grid_class,
+        )
+
+    @classmethod
+    def from_fields(
+        cls,
+        name: str,
+        values: Field,
+        active: Field,
+        *,
+        like: Described | None = None,
+        transform: Transform | None = None,
+        metadata: Mapping[str, Any] | None = None,
+        background: Any = 0,
+        half: bool | None = None,
+        grid_class: str | None = None,
+    ) -> "Grid":
+        """A grid with a leaf wherever cells are active; arguments and errors as of `from_dense`."""
+        value_type = _value_type_of(name, values.values)
+        if any(abs(cell) > 2**31 for corner in active.box for cell in corner):
+            raise GridError(
+                f"grid {name!r}: cells from {active.origin} leave the range of 32-bit indices"
+            )
         if transform is None:
             if like is None:
                 raise GridError(f"grid {name!r}: needs a transform, or a grid to be like")
@@ -200,18 +291,14 @@ class Grid:
             entries.update(Metadata.of({"class": grid_class}))
         if half is None:
             half = like.is_half if like is not None else False
-        background = np.array(
-            np.broadcast_to(np.asarray(background, values.dtype), values.shape[3:])
-        )
-        tree = _cut_into_leaves(values, active, origin, background, value_type)
+        dtype, kind = values.values.dtype, values.values.shape[4:]
+        background = np.array(np.broadcast_to(np.asarray(background, dtype), kind))
+        leaf_active = active.values.reshape(-1, LEAF_CELLS)
+        leaf_values = values.blocks(active.bricks).reshape(-1, LEAF_CELLS, *kind)
+        leaf_values[~leaf_active] = background
+        origins = active.bricks * np.int32(LEAF_EDGE)
+        tree = Tree(background, origins, leaf_active, leaf_values, Tiles.none(value_type))
         return cls(name, value_type.name, transform, tree, entries, half)
-
-
-def as_bricks(dense: AnyArray) -> AnyArray:
-    """A view `[brick x, y, z, cell x, y, z, …]` of an array aligned to leaves."""
-    x, y, z = (cells // LEAF_EDGE for cells in dense.shape[:3])
-    split = dense.reshape(x, LEAF_EDGE, y, LEAF_EDGE, z, LEAF_EDGE, *dense.shape[3:])
-    return split.transpose(0, 2, 4, 1, 3, 5, *range(6, split.ndim))
 
 
 def _put_bricks(
@@ -226,41 +313,14 @@ def _put_bricks(
     as_bricks(active)[i, j, k] = are_active[chosen]
 
 
-def _value_type_of(name: str, values: AnyArray, active: BoolArray) -> ValueType:
-    if active.dtype != np.bool_ or active.ndim != 3 or values.shape[:3] != active.shape:
-        raise GridError(
-            f"grid {name!r}: values {values.shape} need a boolean mask of their cells, "
-            f"got {active.dtype} {active.shape}"
-        )
-    components = {(): 1, (3,): 3}.get(values.shape[3:])
+def _value_type_of(name: str, values: AnyArray) -> ValueType:
+    """The type of values in bricks, `[m, 8, 8, 8, ...]`."""
+    kind = values.shape[4:]
+    components = {(): 1, (3,): 3}.get(kind)
     for value_type in VALUE_TYPES.values():
         if value_type.dtype == values.dtype and value_type.components == components:
             return value_type
     raise GridError(
-        f"grid {name!r}: no grid type for {values.dtype} values of shape {values.shape[3:]}; "
+        f"grid {name!r}: no grid type for {values.dtype} values of shape {kind}; "
         f"there are {', '.join(VALUE_TYPES)}"
     )
-
-
-def _cut_into_leaves(
-    values: AnyArray, active: BoolArray, origin: Index, background: AnyArray, value_type: ValueType
-) -> Tree:
-    before = [start % LEAF_EDGE for start in origin]
-    padding = [
-        (gap, -(gap + cells) % LEAF_EDGE) for gap, cells in zip(before, active.shape, strict=True)
-    ]
-    if any(map(any, padding)):
-        values = np.pad(values, padding + [(0, 0)] * (values.ndim - 3))
-        active = np.pad(active, padding)
-    # Eight booleans along z are one integer: much the fastest way to see who is all zero.
-    columns = np.ascontiguousarray(active).view(np.uint64)
-    x, y, z = (cells // LEAF_EDGE for cells in active.shape)
-    occupied = columns.reshape(x, LEAF_EDGE, y, LEAF_EDGE, z).any(axis=(1, 3))
-    bricks = np.argwhere(occupied)
-    i, j, k = bricks.T
-    leaf_active = as_bricks(active)[i, j, k].reshape(-1, LEAF_CELLS)
-    leaf_values = as_bricks(values)[i, j, k].reshape(-1, LEAF_CELLS, *values.shape[3:])
-    leaf_values[~leaf_active] = background
-    lower = np.array([start - gap for start, gap in zip(origin, before, strict=True)], np.int64)
-    origins = (bricks * LEAF_EDGE + lower).astype(np.int32)
-    return Tree(background, origins, leaf_active, leaf_values, Tiles.none(value_type))
