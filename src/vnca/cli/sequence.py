@@ -7,7 +7,7 @@ from pathlib import Path
 from vnca.cli.options import say
 from vnca.errors import SequenceError, VncaError
 from vnca.files import existing_file
-from vnca.io.sequence import FrameSequence, find_frames, format_frames
+from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, with_fitted_scale
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.painter import BROKEN
@@ -16,7 +16,7 @@ from vnca.volume import Volume
 
 
 def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
-    """The frames of a pattern; gaps are told on standard error.
+    """The frames of a pattern; gaps and sub-frames are told on standard error.
 
     Raises:
         SequenceError: If there are none.
@@ -24,6 +24,9 @@ def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
     sequence = find_frames(pattern, frames)
     if sequence.gaps:
         say(f"{pattern}: no file for frames {format_frames(sequence.gaps)}; going on without")
+    if sequence.sub_frames:
+        count, first = len(sequence.sub_frames), sequence.sub_frames[0].name
+        say(f"{pattern}: leaving out {count} sub-frames ({first}, …); only whole frames are used")
     return sequence
 
 
@@ -35,7 +38,7 @@ def beside(path: Path, smoke: SmokeFormat) -> SmokeFormat:
     """
     if smoke.velocity_scale != "fit":
         return smoke
-    frames = find_frames(existing_file(path).parent)
+    frames = frames_beside(existing_file(path))
     places = [at for at, frame in enumerate(frames) if frame.path == path]
     if not places:
         raise SequenceError(
