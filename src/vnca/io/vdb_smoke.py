@@ -70,7 +70,7 @@ def density_header(file: VdbFile, format: SmokeFormat) -> GridHeader:
     if name not in file.names:
         raise GridError(
             f"{file.path}: no density grid {name!r}; "
-            f"choose with --density-grid from {_listed(file)}"
+            f"choose with --density-grid from {file.listed()}"
         )
     header = file.grids[name]
     label = f"{file.path}: density grid {name!r}"
@@ -144,7 +144,7 @@ def _velocity_headers(file: VdbFile, format: SmokeFormat) -> list[GridHeader]:
         return []
     raise GridError(
         f"{file.path}: no velocity {format.velocity_grid!r}; choose with --velocity-grid none or "
-        f"a grid of vectors from {_listed(file)}"
+        f"a grid of vectors from {file.listed()}"
     )
 
 
@@ -193,12 +193,6 @@ def _dense(header: GridHeader, box: Box) -> tuple[FloatArray, BoolArray]:
 def _components(header: GridHeader) -> int | None:
     value_type = VALUE_TYPES.get(header.value_type)
     return value_type.components if value_type else None
-
-
-def _listed(file: VdbFile) -> str:
-    """The grids of a file with their types."""
-    grids = (f"{name} ({header.value_type})" for name, header in file.grids.items())
-    return ", ".join(grids) or "no grid at all"
 
 
 def _numbers(values: Iterable[float]) -> str:

@@ -164,17 +164,25 @@ def _copied(header: GridHeader, name: bytes) -> _Part:
             f"{label}: grids of type {header.value_type} are copied only from files of version "
             f"{WRITTEN_VERSION} or newer, this one has {header.source.version}"
         )
+    if owner.end is None or header.end is None:
+        raise GridError(
+            f"{label} of type {header.value_type} cannot be copied: the file has no offsets, and "
+            "where a grid of this kind ends is not known; write the file again, or without it"
+        )
     if header is not owner and owner.tree_start is None:
         raise GridError(f"{label} shares the tree of a grid with a {owner.map_type}")
+    blocks = owner.blocks or owner.measured().blocks or owner.end
     metadata = header.metadata
     if header.source.library < _INDEX_LIBRARY:
         metadata = Metadata(metadata)
         metadata.pop("file_delayed_load", None)
     head = struct.pack("<I", owner.compression) + metadata.encode()
-    transform_and_tree = [
-        (header.transform_start, header.blocks),
-        *([(owner.tree_start or 0, owner.blocks)] if header is not owner else []),
-    ]
+    transform_and_tree = [(header.transform_start, blocks)]
+    if header is not owner:
+        transform_and_tree = [
+            (header.transform_start, header.end),
+            (owner.tree_start or 0, blocks),
+        ]
 
     def before() -> Iterator[bytes]:
         yield head
@@ -185,7 +193,7 @@ def _copied(header: GridHeader, name: bytes) -> _Part:
         name,
         header.type_name + HALF_SUFFIX * header.is_half,
         before(),
-        _bytes_of(header, owner.blocks, owner.end),
+        _bytes_of(header, blocks, owner.end),
     )
 
 
