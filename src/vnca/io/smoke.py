@@ -173,6 +173,8 @@ def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat)
     matrix = _to_cells_per_frame(smoke, format)  # refuses bad options, needed or not
     if velocity.in_cells_per_frame:
         matrix = np.eye(3)
+    if velocity.in_cells_per_frame or format.velocity_units != "m/s":
+        matrix = velocity.to_density @ matrix
     values = centred(velocity.values, velocity.stored, velocity.staggered)
     known = velocity.stored[:-1, :-1, :-1]
     if not np.array_equal(matrix, np.eye(3)):
