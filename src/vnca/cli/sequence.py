@@ -1,14 +1,17 @@
 """A sequence of smoke as the subcommands see it: frames, gaps told, box, volumes read ahead."""
 
+import dataclasses
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
+from vnca.automaton.rule import SMOKE_THRESHOLD, density_scale
 from vnca.cli.options import say
 from vnca.errors import SequenceError, VncaError
 from vnca.files import existing_file
 from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, with_fitted_scale
+from vnca.io.smoke_format import NO_VELOCITY
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.painter import BROKEN
 from vnca.typing import Box
@@ -78,6 +81,41 @@ def sequence_box(
             "choose others with --frames or another grid with --density-grid"
         )
     return box
+
+
+def require_dense_enough(sequence: FrameSequence, smoke: SmokeFormat, scale: float) -> None:
+    """Refuse a sequence of which nothing would be painted, as with densities in another unit.
+
+    Reads frames up to the first that is dense enough; those that cannot be read are passed over.
+
+    Args:
+        sequence: The frames.
+        smoke: How they are read.
+        scale: The density that counts as 1.
+
+    Raises:
+        SequenceError: If no frame holds a cell that counts as smoke.
+    """
+    smoke = dataclasses.replace(smoke, velocity_grid=NO_VELOCITY)
+    most, typical, is_read = 0.0, 0.0, False
+    for frame in sequence:
+        try:
+            density = read_smoke(frame.path, smoke).density
+        except BROKEN:
+            continue
+        is_read = True
+        most = max(most, float(density.max(initial=0)))
+        if most > SMOKE_THRESHOLD * scale:
+            return
+        if density.any():
+            typical = max(typical, density_scale(density))
+    if is_read:
+        raise SequenceError(
+            f"{sequence[0].path.parent}: nothing would be painted, as the greatest density of all "
+            f"frames, {most:.3g}, is below {SMOKE_THRESHOLD:.0%} of the one that counts as 1, "
+            f"{scale:.3g}; "
+            + (f"try --density-scale {typical:.3g}" if most else "choose others with --frames")
+        )
 
 
 def _box_or_error(path: Path, smoke: SmokeFormat) -> Box | VncaError:

@@ -20,7 +20,7 @@ from vnca.cli.film import Film, FilmConfig
 from vnca.cli.options import parse, say
 from vnca.cli.progress import Progress
 from vnca.cli.recorded import recorded_smoke
-from vnca.cli.sequence import open_sequence, sequence_box
+from vnca.cli.sequence import open_sequence, require_dense_enough, sequence_box
 from vnca.cli.termination import finishing
 from vnca.errors import BackendUnavailableError, OptionError
 from vnca.files import remove_leftovers, writable_file, writable_folder
@@ -131,6 +131,7 @@ def paint(options: Stylize, model: Model | None = None) -> None:
         raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
     smoke = with_fitted_scale(options.smoke, sequence)
     box = sequence_box(sequence, smoke, without_broken=options.on_error != "stop")
+    require_dense_enough(sequence, smoke, scales.density)
     backend = choose(options.backend)
     roll = Roll(
         rule,

@@ -23,6 +23,7 @@ from vnca.errors import FileFormatError, GridError
 from vnca.files import existing_file
 from vnca.io.smoke_format import (
     NO_VELOCITY,
+    NOT_WANTED,
     SmokeFormat,
     StoredSmoke,
     StoredVelocity,
@@ -69,6 +70,11 @@ def npz_smoke_box(path: Path, format: SmokeFormat) -> Box:
     return occupied_box(read_npz_density(path))
 
 
+def where_npz_velocity_is(path: Path) -> str:
+    """What to tell whoever expected velocity beside a file that has none."""
+    return f"it would be in a folder v beside a folder d with this file ({NOT_WANTED})"
+
+
 def read_npz_density(path: Path) -> FloatArray:
     """`[x, y, z]` over the whole domain.
 
@@ -109,7 +115,7 @@ def _stored_velocity(path: Path, domain: Box, box: Box, staggered: bool) -> Stor
     if values.shape[:3] != domain.shape:
         raise GridError(
             f"{path}: velocity of {values.shape[:3]} cells (x, y, z), the density beside it has "
-            f"{domain.shape}"
+            f"{domain.shape}; leave the velocity out with --velocity-grid none"
         )
     whole = upper_grown(box)
     inside = whole.intersection(domain)

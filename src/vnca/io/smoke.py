@@ -13,7 +13,7 @@ import numpy as np
 
 from vnca.errors import FileFormatError, GridError, OptionError, SequenceError
 from vnca.files import existing_file
-from vnca.io.npz import npz_smoke_box, read_npz_smoke
+from vnca.io.npz import npz_smoke_box, read_npz_smoke, where_npz_velocity_is
 from vnca.io.orientation import (
     box_to_internal,
     index_to_internal,
@@ -23,7 +23,7 @@ from vnca.io.orientation import (
 from vnca.io.painted import write_painted, write_smoke
 from vnca.io.sequence import Frame
 from vnca.io.smoke_format import SmokeFormat, StoredSmoke, StoredVelocity, up_axis_of
-from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_box
+from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_box, where_vdb_velocity_is
 from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
 from vnca.typing import AnyArray, Box, FloatArray
 from vnca.volume import Volume
@@ -32,6 +32,7 @@ __all__ = [
     "READERS",
     "Reader",
     "SmokeFormat",
+    "missing_velocity",
     "read_smoke",
     "smoke_box",
     "with_fitted_scale",
@@ -53,15 +54,17 @@ class Reader:
     Attributes:
         read: Reads a frame in the axes of its file.
         box: The cells that hold smoke, in the axes of the file.
+        where_velocity_is: What to tell whoever expected velocity in a frame that has none.
     """
 
     read: Callable[[Path, SmokeFormat], StoredSmoke]
     box: Callable[[Path, SmokeFormat], Box]
+    where_velocity_is: Callable[[Path], str]
 
 
 READERS = {
-    ".vdb": Reader(read_vdb_smoke, vdb_smoke_box),
-    ".npz": Reader(read_npz_smoke, npz_smoke_box),
+    ".vdb": Reader(read_vdb_smoke, vdb_smoke_box, where_vdb_velocity_is),
+    ".npz": Reader(read_npz_smoke, npz_smoke_box, where_npz_velocity_is),
 }
 
 
@@ -101,6 +104,15 @@ def smoke_box(path: Path, format: SmokeFormat) -> Box:
         GridError: If there is no density grid.
     """
     return box_to_internal(_reader(path).box(path, format), up_axis_of(path, format))
+
+
+def missing_velocity(path: Path) -> str:
+    """A line for whoever expected velocity in a frame that has none: where it could be.
+
+    Raises:
+        FileFormatError: If the file cannot be read.
+    """
+    return f"{path}: no velocity in this frame; {_reader(path).where_velocity_is(path)}"
 
 
 def with_fitted_scale(format: SmokeFormat, frames: Sequence[Frame]) -> SmokeFormat:

@@ -12,6 +12,7 @@ from vnca.io.velocity import VelocityUnits
 from vnca.typing import AnyArray, BoolArray, Box, FloatArray, Index
 
 NO_VELOCITY = "none"
+NOT_WANTED = "--velocity-grid none says that none is wanted"
 # What a velocity grid's metadata says of its units, where it was written by vnca.
 UNITS_METADATA = "velocity_units"
 CELLS_PER_FRAME: VelocityUnits = "cells/frame"

@@ -16,10 +16,13 @@ def components(header: GridHeader) -> int | None:
 
 
 def listed_vectors(file: VdbFile) -> str:
-    """What could be velocity: grids of vectors, and grids of numbers that are three of a kind."""
+    """What could be velocity: grids of vectors, and grids of numbers that are three of a kind.
+
+    Empty if there are none.
+    """
     vectors = [f"{name} ({header.value_type})" for name, header in _vectors(file).items()]
     triples = [parts for parts in _triples(file).values() if not _missing(file, parts)]
-    return ", ".join(vectors + [f"{x} with {y} and {z}" for x, y, z in triples]) or "none"
+    return ", ".join(vectors + [f"{x} with {y} and {z}" for x, y, z in triples])
 
 
 def velocity_headers(file: VdbFile, format: SmokeFormat) -> list[GridHeader]:

@@ -8,6 +8,7 @@ import numpy as np
 from vnca.errors import FileFormatError, GridError
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
+    NOT_WANTED,
     UNITS_METADATA,
     SmokeFormat,
     StoredSmoke,
@@ -58,14 +59,17 @@ def vdb_smoke_box(path: Path, format: SmokeFormat) -> Box:
         return header.read().active_box() if header.box is None else header.box
 
 
-def vdb_vectors(path: Path) -> str:
-    """The grids that could be velocity, for messages.
+def where_vdb_velocity_is(path: Path) -> str:
+    """What to tell whoever expected velocity in a file that has none under a known name.
 
     Raises:
         FileFormatError: If the file cannot be read.
     """
     with open_vdb(path) as file:
-        return listed_vectors(file)
+        vectors = listed_vectors(file)
+    if not vectors:
+        return f"no other grid of vectors either ({NOT_WANTED})"
+    return f"choose with --velocity-grid from {vectors} ({NOT_WANTED})"
 
 
 def density_header(file: VdbFile, format: SmokeFormat) -> GridHeader:
