@@ -123,15 +123,16 @@ def test_smoke_is_drawn_in_the_colours_of_its_grid(
     assert pixels(render("white.png", *options))[16, 20].min() > 0.9
 
 
+@pytest.mark.parametrize("has_grid", [True, False])
 def test_a_frame_without_smoke_is_background(
-    vnca: Vnca, render: Callable[..., Path], smoke: Path
+    vnca: Vnca, render: Callable[..., Path], smoke: Path, has_grid: bool
 ) -> None:
     path = smoke / "ball_0001.vdb"
     with open_vdb(path) as file:
         density = file.grids["density"].read()
         nothing = np.zeros((0, 0, 0), np.float32)
         empty = Grid.from_dense("density", nothing, nothing == 0, (0, 0, 0), like=density)
-        write_vdb(path, [empty])
+        write_vdb(path, [empty] if has_grid else [])
     folder = render("frame_#.png").parent
     assert pixels(folder / "frame_1.png").max() < 0.1
     assert pixels(folder / "frame_2.png").max() > 0.5

@@ -13,10 +13,15 @@ from vnca.io.smoke_format import CELLS_PER_FRAME, UNITS_METADATA, SmokeFormat, u
 from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
-from vnca.typing import BoolArray, Box, FloatArray
+from vnca.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.volume import Volume, refined_transform
 
 COLOUR_GRIDS = ("Cd",)
+# Metadata of a density that hold for a colour on its cells as well. All others may tell of its
+# name, its type, its values or its history.
+_SHARED_METADATA = ("class", "is_local_space")
+# Blender's, of the cells of a grid: not true of finer ones.
+_METADATA_OF_CELLS = ("file_base_resolution", "file_voxel_size")
 _HALF_MOST = float(np.finfo(np.float16).max)
 
 
@@ -33,8 +38,9 @@ def write_painted(
 ) -> None:
     """Write a frame of a sequence with new density and colour as a VDB file.
 
-    Both get the transform, metadata, active cells and half-float saving of the source's density;
-    every other grid of a VDB source is copied unchanged, except those the colours replace. The
+    Both get the transform, active cells and half-float saving of the source's density, and the
+    painted density its background and metadata, too. Every other grid of a VDB source is copied
+    unchanged, except those the colours replace; a source without grids makes a file without. The
     file has the source's axes: of an npz source, +y up, a voxel size of 1, and its velocity.
     Refined, density and colour get the transform of the finer cells, and those with density are
     active.
@@ -54,7 +60,7 @@ def write_painted(
         ShapeError: If the arrays do not cover the source's density.
         OutputError: If the path cannot be written, or has another suffix than `.vdb`.
         FileFormatError: If the source cannot be read.
-        GridError: If the source has no density grid.
+        GridError: If the source has grids, but no density grid, or one that cannot be copied.
     """
     if density.shape != box.shape or colour.shape != (*box.shape, 3):
         raise ShapeError(
@@ -109,7 +115,8 @@ def write_smoke(path: Path, volume: Volume) -> None:
 def read_colour(path: Path, format: SmokeFormat, *, grid: str, box: Box) -> FloatArray | None:
     """Linear RGB `[x, y, z, 3]` over `box`, in our axes, of a painted frame.
 
-    None where the file has no grid of that name; black where the grid has no value.
+    None where the file has no grid of that name; black where the grid has no value, or the file
+    no grid at all.
 
     Raises:
         FileFormatError: If the file cannot be read.
@@ -119,6 +126,8 @@ def read_colour(path: Path, format: SmokeFormat, *, grid: str, box: Box) -> Floa
         return None
     up = up_axis_of(path, format)
     with open_vdb(path) as file:
+        if not file.grids:
+            return np.zeros((*box.shape, 3), np.float32)
         if grid not in file.grids:
             return None
         header = file.grids[grid]
@@ -150,9 +159,16 @@ class _Painting(NamedTuple):
         inside = cells.slices(self.box)
         return _Painting(self.density[inside], self.colour[inside], cells, self.refine)
 
-    def active(self, of_file: BoolArray) -> BoolArray:
+    def active(self, of_file: BoolArray, background: AnyArray | float = 0) -> BoolArray:
         """Which cells to store; `of_file` are active in the file."""
-        return of_file if self.refine == 1 else self.density != 0
+        if self.refine == 1:
+            return of_file
+        if not background:
+            return self.density != 0
+        # A cell that is not stored would not be empty.
+        for axis in range(3):
+            of_file = of_file.repeat(self.refine, axis)
+        return of_file | (self.density != 0)
 
     def transform(self, of_file: Transform) -> Transform:
         """That of the painted cells; `of_file` is that of the file's."""
@@ -165,9 +181,13 @@ def _paint_vdb(
     path: Path, source: Path, format: SmokeFormat, frame: _Painting, colour_grids: Sequence[str]
 ) -> None:
     with open_vdb(source) as file:
+        if not file.grids:
+            write_vdb(path, [], metadata=file.metadata)
+            return
         header, old, cells = read_density(file, format)
         frame = frame.over(cells, source)
-        active = frame.active(old.to_dense(cells)[1])
+        background = old.tree.background
+        active = frame.active(old.to_dense(cells)[1], background)
         transform, origin = frame.transform(old.transform), frame.box.lower
         density, colour = frame.density, frame.colour
         dtype = VALUE_TYPES[old.value_type].dtype
@@ -176,15 +196,26 @@ def _paint_vdb(
         if old.is_half or dtype.itemsize == 2:
             density, colour = (np.clip(a, -_HALF_MOST, _HALF_MOST) for a in (density, colour))
         new = Grid.from_dense(
-            old.name, density.astype(dtype), active, origin, like=old, transform=transform
+            old.name,
+            density.astype(dtype),
+            active,
+            origin,
+            like=old,
+            transform=transform,
+            background=background,
         )
+        for name in _METADATA_OF_CELLS if frame.refine > 1 else ():
+            new.metadata.pop(name, None)
         grids: list[Grid | GridHeader] = [
             new if name == header.name else other
             for name, other in file.grids.items()
             if name == header.name or decoded(other.grid_name) not in colour_grids
         ]
+        shared = {name: old.metadata[name] for name in _SHARED_METADATA if name in old.metadata}
         grids += [
-            Grid.from_dense(name, colour, active, origin, like=old, transform=transform)
+            Grid.from_dense(
+                name, colour, active, origin, transform=transform, metadata=shared, half=old.is_half
+            )
             for name in colour_grids
         ]
         write_vdb(path, grids, metadata=file.metadata)

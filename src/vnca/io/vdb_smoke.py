@@ -16,7 +16,7 @@ from vnca.io.smoke_format import (
     single_precision,
     upper_grown,
 )
-from vnca.io.vdb import Grid, GridHeader, Transform, VdbFile, open_vdb
+from vnca.io.vdb import EMPTY_BOX, Grid, GridHeader, Transform, VdbFile, open_vdb
 from vnca.io.vdb_grids import components, listed_vectors, velocity_headers
 from vnca.io.vdb_velocity import resampled_velocity
 from vnca.typing import BoolArray, Box, FloatArray
@@ -29,13 +29,16 @@ MOST_CELLS, MOST_CELLS_A_BYTE = 2**27, 2**12
 def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
     """Density over the box of its active cells, and velocity where the file has it.
 
-    Inactive cells are empty, whatever value they store.
+    Inactive cells are empty, whatever value they store. A file without grids is a frame without
+    smoke, in a place of which nothing is known.
 
     Raises:
         FileFormatError: If the file cannot be read.
         GridError: If grids are missing, of the wrong kind, or do not fit together.
     """
     with open_vdb(path) as file:
+        if not file.grids:
+            return StoredSmoke(np.zeros((0, 0, 0), np.float32), (0, 0, 0), np.eye(4), None)
         header, density, box = read_density(file, format)
         values, active = density.to_dense(box, fill=0)
         del density, active
@@ -52,9 +55,11 @@ def vdb_smoke_box(path: Path, format: SmokeFormat) -> Box:
 
     Raises:
         FileFormatError: If the file cannot be read.
-        GridError: If there is no density grid.
+        GridError: If there are grids, but no density grid.
     """
     with open_vdb(path) as file:
+        if not file.grids:
+            return EMPTY_BOX
         header = density_header(file, format)
         return header.read().active_box() if header.box is None else header.box
 
@@ -120,6 +125,12 @@ def _read_velocity(
     headers = velocity_headers(file, format)
     if not headers:
         return None
+    for header in headers:
+        if header.linear_transform is None:
+            raise GridError(
+                f"{file.path}: velocity grid {header.name!r} has a {header.map_type}, and only "
+                "linear transforms are supported; leave it out with --velocity-grid none"
+            )
     # A vector grid has one transform for all components, a scalar one its own.
     axes = (None,) if len(headers) == 1 else (0, 1, 2)
     faces = [_is_on_faces(h, axis, format, density) for h, axis in zip(headers, axes, strict=True)]

@@ -140,4 +140,7 @@ for cell in cells:
 for grid in (wind, *parts):
     grid.transform = large
 save("wind", smoke, wind)
+bent = named("vel", wind.deepCopy())
+bent.transform = vdb.createFrustumTransform((0, 0, 0), (10, 10, 10), 0.5, 10.0)
+save("wind_bent", smoke, bent)
 save("wind_parts", smoke, *parts)

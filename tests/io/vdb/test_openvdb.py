@@ -274,6 +274,13 @@ def test_the_frame_kept_with_the_tests_is_bit_identical_to_openvdb(
     agree_on([real_frame, tmp_path / "again.vdb"], judge, assert_agrees)
 
 
+def test_velocity_in_a_frustum_is_named_with_the_way_out(written_by_openvdb: Path) -> None:
+    path = written_by_openvdb / "wind_bent.vdb"
+    with pytest.raises(GridError, match=r"grid 'vel' has a Non.*FrustumMap.* --velocity-grid none"):
+        read_smoke(path, SmokeFormat())
+    assert read_smoke(path, SmokeFormat(velocity_grid="none")).velocity is None
+
+
 @pytest.mark.parametrize("name", ["wind", "wind_parts"])
 def test_a_wind_in_large_turned_cells_of_openvdb_is_read_in_those_of_the_smoke(
     name: str, written_by_openvdb: Path

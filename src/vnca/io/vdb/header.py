@@ -11,7 +11,14 @@ from typing import BinaryIO
 from vnca.errors import GridError
 from vnca.io.vdb.cursor import Cursor
 from vnca.io.vdb.grid import EMPTY_BOX, Grid
-from vnca.io.vdb.layout import HALF_SUFFIX, SUFFIX, TREE, VALUE_TYPES, Compression
+from vnca.io.vdb.layout import (
+    HALF_SUFFIX,
+    SUFFIX,
+    TREE,
+    VALUE_TYPES,
+    WRITTEN_VERSION,
+    Compression,
+)
 from vnca.io.vdb.metadata import Metadata, read_metadata
 from vnca.io.vdb.transform import Transform, read_transform
 from vnca.io.vdb.tree import locate_leaves, read_tree
@@ -110,6 +117,25 @@ class GridHeader:
     def is_readable(self) -> bool:
         """Whether values of this kind can be read here; others are listed and copied."""
         return (self.parent or self)._is_of_known_layout and self.linear_transform is not None
+
+    @property
+    def obstacle_to_copying(self) -> str | None:
+        """Why it cannot be copied to another file, if so; the words follow its name."""
+        owner = self.parent or self
+        version = self.source.version
+        if version < WRITTEN_VERSION and self.value_type not in VALUE_TYPES:
+            return (
+                f"is of type {self.value_type}: those are copied only from files of version "
+                f"{WRITTEN_VERSION} or newer, this one has {version}"
+            )
+        if owner.end is None or self.end is None:
+            return (
+                f"is of type {self.value_type} behind a {self.map_type}: in a file without offsets "
+                "where it ends is not known; write the file again, or without this grid"
+            )
+        if owner is not self and owner.tree_start is None:
+            return f"shares the tree of a grid with a {owner.map_type}"
+        return None
 
     @property
     def _is_of_known_layout(self) -> bool:
