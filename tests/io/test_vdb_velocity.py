@@ -97,9 +97,11 @@ def test_metres_are_turned_into_the_cells_of_a_turned_density(tmp_path: Path) ->
     turned = rotation(2, 0.3) @ np.diag([0.5, -0.25, 1.0, 1.0])
     shape, origin = around(COARSE, turned)
     stored = grid("vel", wind(places(COARSE, shape, origin)), COARSE, origin)
-    path = saved(tmp_path / "s.vdb", smoke(turned), stored)
-    expected = wind(places(turned)) @ np.linalg.inv(turned[:3, :3]).T / 10
-    np.testing.assert_allclose(velocity(path, METRES), expected, rtol=1e-4, atol=1e-4)
+    found = read_smoke(saved(tmp_path / "s.vdb", smoke(turned), stored), METRES)
+    matrix = found.index_to_world
+    at = places(matrix, found.box.shape, found.origin)
+    expected = wind(at) @ np.linalg.inv(matrix[:3, :3]).T / 10
+    np.testing.assert_allclose(found.velocity, expected, rtol=1e-4, atol=1e-4)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

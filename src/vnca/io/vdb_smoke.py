@@ -10,6 +10,7 @@ from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
     NOT_WANTED,
     UNITS_METADATA,
+    Extent,
     SmokeFormat,
     StoredSmoke,
     StoredVelocity,
@@ -50,8 +51,8 @@ def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
         )
 
 
-def vdb_smoke_box(path: Path, format: SmokeFormat) -> Box:
-    """The box of the density's active cells, from the header where it has one.
+def vdb_smoke_extent(path: Path, format: SmokeFormat) -> Extent:
+    """Where the density's active cells lie, from the header where it tells.
 
     Raises:
         FileFormatError: If the file cannot be read.
@@ -59,9 +60,10 @@ def vdb_smoke_box(path: Path, format: SmokeFormat) -> Box:
     """
     with open_vdb(path) as file:
         if not file.grids:
-            return EMPTY_BOX
+            return Extent(EMPTY_BOX, np.eye(4))
         header = density_header(file, format)
-        return header.read().active_box() if header.box is None else header.box
+        box = header.read().active_box() if header.box is None else header.box
+        return Extent(box, header.transform.index_to_world)
 
 
 def where_vdb_velocity_is(path: Path) -> str:
