@@ -34,6 +34,25 @@ def refined(field: Field, factor: int) -> Field:
     return replace(field, bricks=bricks, values=values, box=box).in_order()
 
 
+def replicated(field: Field, factor: int) -> Field:
+    """A field on a grid `factor` times as fine, where each cell has the value of the one it is in."""
+    values = field.values
+    for axis in (1, 2, 3):
+        values = values.repeat(factor, axis)
+    parts = _bricks_of(values)
+    offsets = np.array(list(product(range(factor), repeat=3)), np.int32)
+    bricks = (field.bricks[:, None] * np.int32(factor) + offsets).reshape(-1, 3)
+    return replace(field, bricks=bricks, values=parts, box=field.box.refined(factor)).in_order()
+
+
+def _bricks_of(values: AnyArray) -> AnyArray:
+    """Cubes `[m, 8f, 8f, 8f, ...]` as the bricks in them, `[m f³, 8, 8, 8, ...]`, z fastest."""
+    edge, kind = values.shape[1] // EDGE, values.shape[4:]
+    split = values.reshape(-1, edge, EDGE, edge, EDGE, edge, EDGE, *kind)
+    order = (0, 1, 3, 5, 2, 4, 6, *range(7, split.ndim))
+    return split.transpose(order).reshape(-1, EDGE, EDGE, EDGE, *kind)
+
+
 def _divided(field: Field, factor: int) -> Iterator[tuple[AnyArray, AnyArray]]:
     """The finer bricks in some of the bricks at a time, and their values."""
     kind = field.values.shape[4:]
