@@ -111,6 +111,11 @@ def _read_velocity(
     file: VdbFile, format: SmokeFormat, box: Box, density: Transform
 ) -> StoredVelocity | None:
     headers = _velocity_headers(file, format)
+    if not headers and file.unfound and format.velocity_grid is None:
+        raise GridError(
+            f"{file.path}: no velocity among {file.listed()}; write the file again with offsets, "
+            "or leave the velocity out with --velocity-grid none"
+        )
     if not headers:
         return None
     # A vector grid has one transform for all components, a scalar one its own.
