@@ -35,7 +35,7 @@ def refined(field: Field, factor: int) -> Field:
 
 
 def replicated(field: Field, factor: int) -> Field:
-    """A field on a grid `factor` times as fine, where each cell has the value of the one it is in."""
+    """A field on a grid `factor` times as fine; a cell has the value of the one that it is in."""
     values = field.values
     for axis in (1, 2, 3):
         values = values.repeat(factor, axis)

@@ -97,7 +97,7 @@ def _is_staggered(header: GridHeader, format: SmokeFormat, is_apart: bool) -> bo
 def _at_centres(
     header: GridHeader, cells: IntArray, density: Transform, shift: AnyArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Values `[n, c]` of a grid at the centres of the density's cells `[n, 3]`, and where it has any.
+    """Values `[n, c]` of a grid at the centres of the density's cells, and where it has any.
 
     `shift` is where the values lie below the centres of the grid's own cells.
 
