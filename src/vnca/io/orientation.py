@@ -4,16 +4,13 @@ For a file with y up, ours is (x, y, z) = its (z, x, y): a rotation, without fli
 axes move; the world stays the file's, so `index_to_world` gives the same world coordinates.
 """
 
-from typing import Literal, TypeAlias
-
 import numpy as np
 
-from vnca.typing import AnyArray, Box, Index
-
-UpAxis: TypeAlias = Literal["z", "y"]
+from vnca.typing import AnyArray, Box, Index, UpAxis
+from vnca.volume import UPRIGHT
 
 # For each of our axes, the file's; and the reverse.
-_TO_INTERNAL: dict[UpAxis, Index] = {"z": (0, 1, 2), "y": (2, 0, 1)}
+_TO_INTERNAL = UPRIGHT
 _TO_FILE: dict[UpAxis, Index] = {"z": (0, 1, 2), "y": (1, 2, 0)}
 
 
