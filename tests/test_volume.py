@@ -75,18 +75,3 @@ def test_a_frame_without_smoke_has_none_on_a_finer_grid() -> None:
     fine = nothing.refined(3)
     assert fine.box.is_empty
     assert fine.velocity is not None
-
-
-def test_cameras_are_where_up_is_z_whatever_is_up_in_the_world() -> None:
-    upright = ramp()
-    np.testing.assert_array_equal(upright.index_to_upright, MATRIX)
-    # (x, y, z) of a world with y up is (z, x, y) of ours: a rotation, without flips.
-    lying = replace(upright, up="y")
-    assert (lying.index_to_upright @ [0, 0, 0, 1]).tolist() == [7, 3, -2, 1]
-    assert np.linalg.det(lying.index_to_upright) == pytest.approx(np.linalg.det(MATRIX))
-    assert lying.refined(2).up == "y"
-
-
-def test_the_length_of_a_cell_is_that_of_a_cube_as_large() -> None:
-    assert ramp().cell_length == pytest.approx(np.cbrt(0.5 * 0.25 * 2))
-    assert ramp().refined(2).cell_length == pytest.approx(ramp().cell_length / 2)

@@ -1,6 +1,6 @@
 """Aliases for the arrays and boxes that travel between modules."""
 
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,6 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 IntArray: TypeAlias = NDArray[np.int32]
 AnyArray: TypeAlias = NDArray[Any]
 Index: TypeAlias = tuple[int, int, int]
-UpAxis: TypeAlias = Literal["z", "y"]
 
 
 class Box(NamedTuple):

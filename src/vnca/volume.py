@@ -5,10 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vnca.errors import ShapeError
-from vnca.typing import AnyArray, Box, FloatArray, Index, UpAxis
-
-UPRIGHT: dict[UpAxis, Index] = {"z": (0, 1, 2), "y": (2, 0, 1)}
-"""For each of our axes, with +z up, that of a world in which another is up: a rotation."""
+from vnca.typing import AnyArray, Box, FloatArray, Index
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +18,6 @@ class Volume:
         origin: Index coordinates of cell `[0, 0, 0]`; anchors the frame in its sequence.
         index_to_world: 4×4, `world = index_to_world @ (i, j, k, 1)` for cell centres.
         frame: Frame number in its sequence.
-        up: Which axis of the world points up.
     """
 
     density: FloatArray
@@ -29,7 +25,6 @@ class Volume:
     origin: Index
     index_to_world: AnyArray
     frame: int
-    up: UpAxis = "z"
 
     def __post_init__(self) -> None:
         if self.density.ndim != 3:
@@ -52,16 +47,6 @@ class Volume:
         x, y, z = np.linalg.norm(self.index_to_world[:3, :3], axis=0)
         return float(x), float(y), float(z)
 
-    @property
-    def cell_length(self) -> float:
-        """World length of the edge of a cube as large as a cell."""
-        return float(np.cbrt(abs(np.linalg.det(self.index_to_world[:3, :3]))))
-
-    @property
-    def index_to_upright(self) -> AnyArray:
-        """4×4, from cell centres to the world turned so that its up is +z: where cameras are."""
-        return self.index_to_world[[*UPRIGHT[self.up], 3]]
-
     def refined(self, factor: int) -> "Volume":
         """The same smoke in the same place, on a grid `factor` times as fine along each axis.
 
@@ -80,7 +65,6 @@ class Volume:
             self.box.refined(factor).lower,
             refined_transform(self.index_to_world, factor),
             self.frame,
-            self.up,
         )
 
 

@@ -267,15 +267,6 @@ def test_a_simulated_volume_is_read_back_by_default_options(tmp_path: Path) -> N
         write_smoke(tmp_path / "s", volume)
 
 
-def test_smoke_of_a_world_with_y_up_is_written_with_z_up(tmp_path: Path) -> None:
-    lying = Volume(random(*SHAPE), None, ORIGIN, np.diag([0.1, 0.2, 0.3, 1.0]), 4, "y")
-    write_smoke(tmp_path / "s.vdb", lying)
-    again = read_smoke(tmp_path / "s.vdb", PLAIN)
-    assert again.up == "z"
-    np.testing.assert_array_equal(again.density, lying.density)
-    np.testing.assert_array_equal(again.index_to_upright, lying.index_to_upright)
-
-
 BLENDER = SmokeFormat(velocity_units="mantaflow", fps=24, time_scale=0.4)
 
 

@@ -4,13 +4,16 @@ For a file with y up, ours is (x, y, z) = its (z, x, y): a rotation, without fli
 axes move; the world stays the file's, so `index_to_world` gives the same world coordinates.
 """
 
+from typing import Literal, TypeAlias
+
 import numpy as np
 
-from vnca.typing import AnyArray, Box, Index, UpAxis
-from vnca.volume import UPRIGHT
+from vnca.typing import AnyArray, Box, Index
+
+UpAxis: TypeAlias = Literal["z", "y"]
 
 # For each of our axes, the file's; and the reverse.
-_TO_INTERNAL = UPRIGHT
+_TO_INTERNAL: dict[UpAxis, Index] = {"z": (0, 1, 2), "y": (2, 0, 1)}
 _TO_FILE: dict[UpAxis, Index] = {"z": (0, 1, 2), "y": (1, 2, 0)}
 
 

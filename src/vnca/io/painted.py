@@ -80,7 +80,7 @@ def write_smoke(path: Path, volume: Volume) -> None:
         OutputError: If the path cannot be written, or has another suffix than `.vdb`.
     """
     _require_vdb(path)
-    transform = Transform.from_matrix(volume.index_to_upright)
+    transform = Transform.from_matrix(volume.index_to_world)
     active = volume.density > 0
     grids = [
         Grid.from_dense(

@@ -90,7 +90,6 @@ def read_smoke(path: Path, format: SmokeFormat, *, frame: int = 0) -> Volume:
         origin=index_to_internal(stored.origin, up),
         index_to_world=matrix_to_internal(stored.index_to_world, up),
         frame=frame,
-        up=up,
     )
 
 
