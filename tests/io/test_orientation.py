@@ -32,12 +32,13 @@ def test_turning_does_not_mirror() -> None:
     assert np.linalg.det(matrix_to_internal(np.eye(4), "y")) == 1
 
 
-def test_a_cell_keeps_its_place_in_the_world() -> None:
+def test_a_cell_keeps_its_place_in_the_world_which_turns_with_it() -> None:
     matrix = np.random.default_rng(0).standard_normal((4, 4))
     cell = (3, -5, 8)
     inside = index_to_internal(cell, "y")
     assert inside == (8, 3, -5)
-    np.testing.assert_allclose(matrix_to_internal(matrix, "y") @ (*inside, 1), matrix @ (*cell, 1))
+    x, y, z, one = matrix @ (*cell, 1)
+    np.testing.assert_allclose(matrix_to_internal(matrix, "y") @ (*inside, 1), (z, x, y, one))
 
 
 @pytest.mark.parametrize("up", ["z", "y"])

@@ -1,7 +1,7 @@
 """Between the axes of a file and ours, where up is +z.
 
-For a file with y up, ours is (x, y, z) = its (z, x, y): a rotation, without flips. Only index
-axes move; the world stays the file's, so `index_to_world` gives the same world coordinates.
+For a file with y up, ours is (x, y, z) = its (z, x, y): a rotation, without flips, of its index
+axes and of its world alike. So `index_to_world` leads to a world where up is +z, too.
 """
 
 from typing import Literal, TypeAlias
@@ -43,8 +43,9 @@ def index_to_internal(index: Index, up: UpAxis) -> Index:
 
 
 def matrix_to_internal(index_to_world: AnyArray, up: UpAxis) -> AnyArray:
-    """A file's 4×4 `index_to_world` for our indices; the same world."""
-    return index_to_world[:, [*_TO_INTERNAL[up], 3]]
+    """A file's 4×4 `index_to_world` for our indices, to a world where up is +z."""
+    order = [*_TO_INTERNAL[up], 3]
+    return index_to_world[np.ix_(order, order)]
 
 
 def _turned(array: AnyArray, order: Index, vectors: bool) -> AnyArray:
