@@ -228,6 +228,21 @@ def turntable(
     return Orthographic(_point((low + high) / 2), azimuth, elevation, height=float(needed))
 
 
+def world_box(
+    lower: Sequence[float], upper: Sequence[float], cells_to_world: AnyArray
+) -> tuple[AnyArray, AnyArray]:
+    """The least and greatest corner of the world's box around a box of cells.
+
+    Args:
+        lower: Least corner of the box of cells, in cell coordinates.
+        upper: Greatest corner.
+        cells_to_world: 4×4, affine.
+    """
+    corners = np.array(list(product(*zip(lower, upper, strict=True))), np.float64)
+    corners = corners @ cells_to_world[:3, :3].T + cells_to_world[:3, 3]
+    return corners.min(axis=0), corners.max(axis=0)
+
+
 def view_axes(azimuth: float, elevation: float) -> tuple[AnyArray, AnyArray, AnyArray]:
     """Unit vectors to the right, up and forward in the picture, for angles in degrees."""
     a, e = math.radians(azimuth), math.radians(elevation)

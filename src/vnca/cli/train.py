@@ -120,7 +120,8 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
     with fitting(config, "this frame"):
         budget = memory_budget(options.memory_budget)
         trainer = smoke_trainer(smoke, style, config, vgg, device=device, memory_budget=budget)
-    width = view_width(smoke_bounds(smoke, trainer.rule().scales.density))
+    bounds = smoke_bounds(smoke, trainer.rule().scales.density)
+    width = view_width(bounds, smoke.index_to_world)
     training = {
         "frame": options.frame.name,
         "style": options.style.name,

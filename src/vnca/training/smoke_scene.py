@@ -13,7 +13,7 @@ from torch import Tensor
 from vnca.automaton.domain import Domain
 from vnca.automaton.priors import DENSITY, VELOCITY, priors, told_velocity
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
-from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable
+from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable, world_box
 from vnca.errors import GridError
 from vnca.render.colour import linear_to_srgb, srgb_to_linear
 from vnca.render.velocity import projected_velocity
@@ -35,6 +35,8 @@ PORTRAIT_STEP = 0.5
 """Distance between samples along a ray, cells: finer than in training, without terraces."""
 PORTRAIT_BACKGROUND = 0.01
 """Linear grey behind the smoke."""
+_UPRIGHT = 1e-6
+"""Cells turned and stretched by less than this are upright cubes."""
 
 
 class SmokeSight(NamedTuple):
@@ -96,6 +98,7 @@ class SmokeScene(Scene[SmokeSight]):
                 box=box,
             )
         super().__init__(domain, priors(domain, smoke, rule), device)
+        self._place = _stood(smoke.index_to_world)
         self.samples = max(domain.box.shape) / view.step
         self.gamma = rule.scales.gamma
         density = domain.gather(smoke.density, smoke.origin) / rule.scales.density
@@ -135,13 +138,16 @@ class SmokeScene(Scene[SmokeSight]):
     def camera(
         self, azimuth: float, elevation: float, *, aspect: float = 1.0
     ) -> Orthographic | Perspective:
-        """A camera around the smoke, as near to its bounding box as that side allows."""
+        """A camera around the smoke, as near to its bounding box as that side allows.
+
+        It is in the world, where lengths are those of a cell.
+        """
         return frame_box(*self._corners, azimuth, elevation, aspect=aspect)
 
     @property
     def _corners(self) -> tuple[list[float], list[float]]:
         lower, upper = (np.asarray(c) - self.domain.box.lower - 0.5 for c in self.box)
-        return lower.tolist(), upper.tolist()
+        return _around(lower, upper, self._place)
 
     def sight(self, random: np.random.Generator) -> SmokeSight:
         """A camera around the smoke, and where along the rays sampling begins."""
@@ -191,6 +197,7 @@ class SmokeScene(Scene[SmokeSight]):
             step=view.step,
             offset=offset,
             mode=view.mode,
+            cells_to_world=self._place,
         )
 
     def motion(self, state: Tensor, sight: SmokeSight, size: int) -> tuple[Tensor, Tensor]:
@@ -208,6 +215,7 @@ class SmokeScene(Scene[SmokeSight]):
             step=self.view.step,
             offset=sight.offset,
             mode=self.view.mode,
+            cells_to_world=self._place,
         )
 
     def _painted_density(self, state: Tensor) -> Tensor:
@@ -215,9 +223,31 @@ class SmokeScene(Scene[SmokeSight]):
         return self.dense(self._density * (1 + change))
 
 
-def view_width(box: Box) -> float:
+def view_width(box: Box, index_to_world: AnyArray) -> float:
     """Cells across a view of training, the same from all sides: patterns keep their size."""
-    return _level_turntable(box.lower, box.upper).height
+    return _level_turntable(*_around(*map(np.array, box), _stood(index_to_world))).height
+
+
+def _stood(index_to_world: AnyArray) -> AnyArray | None:
+    """4×4, how cells stand in the world and what shape they have there, in lengths of a cell.
+
+    None for upright cubes, which need not be turned.
+    """
+    linear = index_to_world[:3, :3] / np.cbrt(abs(np.linalg.det(index_to_world[:3, :3])))
+    if np.allclose(linear, np.eye(3), rtol=0, atol=_UPRIGHT):
+        return None
+    place = np.eye(4)
+    place[:3, :3] = linear
+    return place
+
+
+def _around(
+    lower: AnyArray, upper: AnyArray, place: AnyArray | None
+) -> tuple[list[float], list[float]]:
+    """The box around cells, where cameras are."""
+    if place is not None:
+        lower, upper = world_box(lower, upper, place)
+    return lower.tolist(), upper.tolist()
 
 
 def _level_turntable(
