@@ -10,7 +10,7 @@ import vnca
 ROOT = Path(vnca.__file__).parent
 RANKS = {
     "errors": 0, "typing": 0,
-    "volume": 1, "camera": 1, "colour": 1, "files": 1, "kernels": 1,
+    "volume": 1, "lattice": 1, "camera": 1, "colour": 1, "files": 1, "kernels": 1,
     "io": 2, "automaton": 2, "render": 2, "features": 2, "simulate": 2,
     "losses": 3, "stylize": 3,
     "training": 4,
@@ -18,7 +18,7 @@ RANKS = {
     "cli": 6,
 }  # fmt: skip
 WITHOUT_TORCH = {
-    "errors", "typing", "volume", "camera", "colour", "files", "io", "automaton",
+    "errors", "typing", "volume", "lattice", "camera", "colour", "files", "io", "automaton",
     "simulate", "stylize",
 }  # fmt: skip
 KERNELS_WITH_TORCH = {
