@@ -229,7 +229,7 @@ def turntable(
 
 
 def world_box(
-    lower: Sequence[float], upper: Sequence[float], cells_to_world: AnyArray
+    lower: Sequence[float] | AnyArray, upper: Sequence[float] | AnyArray, cells_to_world: AnyArray
 ) -> tuple[AnyArray, AnyArray]:
     """The least and greatest corner of the world's box around a box of cells.
 

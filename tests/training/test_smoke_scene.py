@@ -121,9 +121,8 @@ def lying(smoke: Volume, way: int) -> Volume:
     velocity = smoke.velocity.transpose(*order, 3)[:, ::-1][..., order] * np.float32([1, -1, 1])
     turn = np.eye(4)[:, [*order, 3]]
     turn[:, 1] *= -1
-    corner = turn @ [*(n / 2 for n in (0, density.shape[1] * 2 - 2, 0)), 0]
     matrix = smoke.index_to_world @ turn
-    matrix[:3, 3] -= (smoke.index_to_world @ corner)[:3] - smoke.index_to_world[:3, 3]
+    matrix[:3, 3] -= matrix[:3, 1] * (density.shape[1] - 1)
     return Volume(density.copy(), velocity.copy(), (0, 0, 0), matrix, smoke.frame)
 
 

@@ -3,15 +3,17 @@
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from vnca.errors import FileFormatError, GridError, OptionError, OutputError, ShapeError, VncaError
 from vnca.files import existing_file, remove_file, remove_leftovers
+from vnca.io.provenance import Provenance
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke import SmokeFormat, read_smoke, write_painted
+from vnca.io.smoke_format import up_axis_of
 from vnca.lattice import Lattice
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.roll import Roll, RollState
@@ -53,6 +55,7 @@ class Painter:
         tell: Is given lines for the user.
         refine: How many times as fine as the smoke's the grid of the painting is; what the roll
             paints is refined smoke.
+        facts: What else files tell of their painting, beside how opaque it is to be seen.
     """
 
     sequence: FrameSequence
@@ -65,6 +68,7 @@ class Painter:
     conditions: Mapping[str, Any]
     tell: Callable[[str], None]
     refine: int = 1
+    facts: Mapping[str, str | int | float] = field(default_factory=dict)
 
     @property
     def unfinished_path(self) -> Path:
@@ -166,8 +170,19 @@ class Painter:
             lattice=self.lattice,
             colour_grids=self.colour_grids,
             refine=self.refine,
+            provenance=self._provenance(read),
         )
         return painting.state
+
+    def _provenance(self, read: _Read) -> Provenance:
+        """What the painting of a frame tells of itself."""
+        scales = self.roll.rule.scales
+        return Provenance(
+            scales.extinction(read.smoke.cell_length),
+            scales.gamma * self.refine,
+            up_axis_of(read.frame.path, self.smoke),
+            self.facts,
+        )
 
     def _read(self, at: int) -> _Read | VncaError:
         """A frame of the sequence, or what is wrong with it."""

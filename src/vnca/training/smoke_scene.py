@@ -225,7 +225,8 @@ class SmokeScene(Scene[SmokeSight]):
 
 def view_width(box: Box, index_to_world: AnyArray) -> float:
     """Cells across a view of training, the same from all sides: patterns keep their size."""
-    return _level_turntable(*_around(*map(np.array, box), _stood(index_to_world))).height
+    lower, upper = (np.asarray(corner) for corner in box)
+    return _level_turntable(*_around(lower, upper, _stood(index_to_world))).height
 
 
 def _stood(index_to_world: AnyArray) -> AnyArray | None:
