@@ -119,7 +119,7 @@ def lying(smoke: Volume, way: int) -> Volume:
     density = smoke.density.transpose(order)[:, ::-1]
     assert smoke.velocity is not None
     velocity = smoke.velocity.transpose(*order, 3)[:, ::-1][..., order] * np.float32([1, -1, 1])
-    turn = np.eye(4)[:, [*order, 3]]
+    turn = np.eye(4)[:, (*order, 3)]
     turn[:, 1] *= -1
     matrix = smoke.index_to_world @ turn
     matrix[:3, 3] -= matrix[:3, 1] * (density.shape[1] - 1)

@@ -1,5 +1,7 @@
 """OpenVDB and this reader and writer understand each other's files."""
 
+import ast
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 
 from vnca.errors import GridError
+from vnca.io.provenance import Provenance
 from vnca.io.vdb import Grid, Transform, open_vdb, write, write_vdb
 from vnca.io.vdb.compression import Codec
 from vnca.io.vdb.layout import Compression, NodeCode
@@ -271,3 +274,20 @@ def test_the_frame_kept_with_the_tests_is_bit_identical_to_openvdb(
 ) -> None:
     write_vdb(tmp_path / "again.vdb", grids_by_name(real_frame))
     agree_on([real_frame, tmp_path / "again.vdb"], judge, assert_agrees)
+
+
+def test_openvdb_reads_what_a_painting_tells_of_itself(openvdb_python: str, tmp_path: Path) -> None:
+    told = Provenance(2.5, 0.75, "z", {"model": "night", "refine": 2, "strength": 0.5})
+    values = np.ones((2, 2, 2), np.float32)
+    path = tmp_path / "painted.vdb"
+    write_vdb(
+        path, [Grid.from_dense("density", values, values > 0, (0, 0, 0))], metadata=told.metadata
+    )
+    script = "import pyopenvdb, sys; print(sorted(pyopenvdb.readAll(sys.argv[1])[1].items()))"
+    command = [openvdb_python, "-c", script, str(path)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    seen = dict(ast.literal_eval(done.stdout))
+    assert seen.items() >= {
+        "vnca_extinction": 2.5, "vnca_gamma": 0.75, "vnca_up_axis": "z", "vnca_model": "night",
+        "vnca_refine": 2, "vnca_strength": 0.5,
+    }.items()  # fmt: skip
