@@ -12,7 +12,7 @@ from vnca.colour import srgb_to_linear
 from vnca.io.provenance import read_provenance
 from vnca.io.smoke import write_smoke
 from vnca.io.vdb import Grid, Transform, write_vdb
-from vnca.typing import AnyArray
+from vnca.typing import AnyArray, Index
 from vnca.volume import Volume
 
 Vnca = Callable[..., Any]
@@ -119,11 +119,9 @@ def shape() -> AnyArray:
     return density
 
 
-def write(
-    folder: Path, density: AnyArray, matrix: AnyArray, origin: Sequence[int] = (0, 0, 0)
-) -> Path:
+def write(folder: Path, density: AnyArray, matrix: AnyArray, origin: Index = (0, 0, 0)) -> Path:
     grid = Grid.from_dense(
-        "density", density, density > 0, tuple(origin), transform=Transform.from_matrix(matrix)
+        "density", density, density > 0, origin, transform=Transform.from_matrix(matrix)
     )
     write_vdb(folder / "s_0001.vdb", [grid])
     return folder

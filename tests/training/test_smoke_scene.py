@@ -232,6 +232,26 @@ def test_the_rule_is_told_the_wind_and_another_density_than_is_seen(tiny_smoke: 
     assert torch.equal(blown._density, windy._density)
 
 
+def test_no_more_density_is_told_in_training_than_in_painting(tiny_smoke: Volume) -> None:
+    """What is denser than the limit is made denser or thinner before it is limited."""
+    steep = replace(tiny_smoke, density=tiny_smoke.density**4 * 6)
+    windy = in_winds(steep)
+    seen = windy._density
+    assert seen.max() > 5
+    for place in range(12):
+        told = windy.variant(place).priors[:, 3]
+        assert told.max() <= 4
+        thin = told < 4
+        factor = (told / seen)[thin & (seen > 0)]
+        torch.testing.assert_close(factor, factor[:1].expand_as(factor))
+        torch.testing.assert_close(told, (factor[0] * seen).clamp_max(4))
+    assert not in_winds(steep, without_density()).variant(3).priors[:, 3].any()
+
+
+def without_density() -> Rule:
+    return Rule.initial(replace(WINDY.config, density_prior=False), WINDY.scales, seed=0)
+
+
 def test_a_rule_that_is_told_no_velocity_is_told_no_wind(tiny_smoke: Volume) -> None:
     deaf = Rule.initial(replace(WINDY.config, velocity_prior=False), Scales(), seed=0)
     blown = in_winds(tiny_smoke, deaf).variant(3)

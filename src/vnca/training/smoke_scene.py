@@ -12,6 +12,7 @@ from torch import Tensor
 
 from vnca.automaton.domain import Domain
 from vnca.automaton.priors import DENSITY, VELOCITY, priors, told_velocity
+from vnca.automaton.priors import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
 from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable, world_box
 from vnca.errors import GridError
@@ -132,7 +133,9 @@ class SmokeScene(Scene[SmokeSight]):
         scene.velocity = torch.from_numpy(velocity).to(self.velocity)
         scene.priors = self.priors.clone()
         scene.priors[:, VELOCITY] = told.to(self.priors)
-        scene.priors[:, DENSITY] *= denser
+        if self._rule.config.density_prior:
+            density = (self._density * denser).clamp_max(TOLD_DENSITY_LIMIT)
+            scene.priors[:, DENSITY] = density[:, None]
         return scene
 
     def camera(

@@ -280,9 +280,10 @@ def test_openvdb_reads_what_a_painting_tells_of_itself(openvdb_python: str, tmp_
     told = Provenance(2.5, 0.75, "z", {"model": "night", "refine": 2, "strength": 0.5})
     values = np.ones((2, 2, 2), np.float32)
     path = tmp_path / "painted.vdb"
-    write_vdb(
-        path, [Grid.from_dense("density", values, values > 0, (0, 0, 0))], metadata=told.metadata
+    grid = Grid.from_dense(
+        "density", values, values > 0, (0, 0, 0), transform=Transform.uniform(0.1)
     )
+    write_vdb(path, [grid], metadata=told.metadata)
     script = "import pyopenvdb, sys; print(sorted(pyopenvdb.readAll(sys.argv[1])[1].items()))"
     command = [openvdb_python, "-c", script, str(path)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
