@@ -38,6 +38,8 @@ from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.memory import memory_budget
 from vnca.training.smoke import smoke_trainer
 from vnca.training.smoke_scene import smoke_bounds, view_width
+from vnca.typing import FloatArray
+from vnca.volume import Volume
 
 COMMAND = "train"
 TEXTURE_FOLDER = "texture"
@@ -132,16 +134,13 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         PICTURE_CELLS: round(config.appearance.style_scale * width, 2),
         **judged_by(vgg),
     }
-    frame = [smoke.density, smoke.origin]
-    if smoke.velocity is not None:
-        frame.append(smoke.velocity)
     session = Session(
         command=COMMAND,
         trainer=trainer,
         folder=folder,
         style=style,
         training=training,
-        inputs=fingerprints(style, config, vgg, frame=frame),
+        inputs=training_inputs(smoke, style, config, vgg),
         asked=asked(dataclasses.replace(options, smoke=smoke_format)),
         preview_every=options.preview_every,
     )
@@ -167,6 +166,16 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         )
     session.run(checkpoint, *notes)
     return options.out
+
+
+def training_inputs(
+    smoke: Volume, style: FloatArray, config: TrainConfig, vgg: VGG16
+) -> dict[str, str]:
+    """What tells a training on smoke from others: the `fingerprints` of what goes into it."""
+    frame = [smoke.density, smoke.origin]
+    if smoke.velocity is not None:
+        frame.append(smoke.velocity)
+    return fingerprints(style, config, vgg, frame=frame)
 
 
 def _given(path: Path, wanted: RuleConfig) -> Rule:
