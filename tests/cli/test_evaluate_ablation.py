@@ -87,7 +87,9 @@ def test_runs_of_something_else_are_refused_and_kept(
         "no_motion_loss-0: holds a run that differs in its options;": ablation(
             frame, *weight, "--learning-rate", "2e-3"
         ),
-        "both-0: holds a run that differs in its options;": ablation(frame, "--motion.weight", "0.6"),
+        "encoding-0: holds a run that differs in its options;": ablation(
+            frame, "--motion.weight", "0.6"
+        ),
     }.items():
         assert words in outcome.complaint
         assert "choose another --out" in outcome.complaint

@@ -16,6 +16,8 @@ from vnca.automaton.priors import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
 from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable, world_box
 from vnca.errors import GridError
+from vnca.losses.pixels import luminance
+from vnca.render.brightness import gamma_for_own_colour
 from vnca.render.colour import linear_to_srgb, srgb_to_linear
 from vnca.render.velocity import projected_velocity
 from vnca.render.view import View, render
@@ -102,6 +104,9 @@ class SmokeScene(Scene[SmokeSight]):
         self._place = _stood(smoke.index_to_world)
         self.samples = max(domain.box.shape) / view.step
         self.gamma = rule.scales.gamma
+        self._grey_gamma = self.gamma
+        if view.mode != "paper":
+            self._grey_gamma = gamma_for_own_colour(smoke.density / rule.scales.density)
         density = domain.gather(smoke.density, smoke.origin) / rule.scales.density
         self._density = torch.from_numpy(density.astype(np.float32)).to(device)
         velocity = np.zeros((len(domain), 3), dtype=np.float32)
@@ -169,6 +174,29 @@ class SmokeScene(Scene[SmokeSight]):
         view = self.look(state, sight.camera, offset=sight.offset)
         picture = linear_to_srgb(view.over(background))
         return picture.permute(2, 0, 1)[None], view.opacity[None]
+
+    def density_pictures(self, state: Tensor, sight: SmokeSight, background: Tensor) -> Tensor:
+        """The density in grey, as `Scene.density_pictures` has it.
+
+        I = Σ d' τ over the cells of a ray, by the paper's integrand whatever that of the colours:
+        by emission and absorption, white smoke that lets nothing through is white, however dense.
+
+        Reference: VNCA, the equations for I and for L_app.
+        """
+        density = self._painted_density(state)
+        view = render(
+            density,
+            density.new_ones(1).expand(*density.shape, 3),
+            sight.camera,
+            rows=self.view.size,
+            columns=self.view.size,
+            gamma=self._grey_gamma,
+            offset=sight.offset,
+            mode="paper",
+            cells_to_world=self._place,
+        )
+        behind = srgb_to_linear(luminance(linear_to_srgb(background).view(1, 3, 1, 1))).view(3)
+        return linear_to_srgb(view.over(behind)).permute(2, 0, 1)[None]
 
     def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
         """Views from the front, the right, the back and above."""
