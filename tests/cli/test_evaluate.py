@@ -16,7 +16,7 @@ SMALL = ("--size", "64", "--style-scale", "1", *FEW)
 NAMES = {
     "style.gap_closed", "views.spread", "views.reprojection", "time.warp_short", "time.warp_long",
     "time.flow", "motion.direction", "motion.magnitude", "motion.transport",
-    "density.mass_change", "density.moved", "density.appeared",
+    "density.mass_change", "density.moved",
 }  # fmt: skip
 
 
@@ -61,7 +61,6 @@ def test_a_report_has_every_measure_and_needs_nothing_else(
             assert name == "time.warp_long"
             assert measure["reason"] == "it takes 8 frames in a row"
     assert measures["time.warp_short"]["ratio"] > 0
-    assert measures["density.appeared"]["value"] == 0
     assert set(measures["density.moved"]["frames"]) == {"1", "2", "3"}
     assert len(measures["views.spread"]["views"]) == 32
     assert {"network", "dis", "unit"} <= set(measures["motion.direction"])

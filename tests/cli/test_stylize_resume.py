@@ -194,6 +194,7 @@ def without_a_painted_frame(painted: Painted) -> None:
         (["--domain", "box"], '--domain is another than when the painting was begun ("active", '),
         (["--strength", 0.5], "--strength"),
         (["--density-scale", 0.5], "--density-scale"),
+        (["--gamma", 2], "--gamma is another than when the painting was begun (0.7, now 2.0)"),
         (["--colour-grid", "color"], "--colour-grid"),
         (["--backend", "reference"], "--backend"),
         pytest.param(["--precision", "bfloat16"], "--precision", marks=needs_bfloat16),
@@ -223,7 +224,7 @@ def test_what_does_not_touch_the_files_may_be_another(
     unfinished: Painted, unharmed: dict[str, bytes], tmp_path: Path
 ) -> None:
     film = ("--preview", tmp_path / "film.gif", "--film.rows", 32, "--film.columns", 32)
-    assert unfinished.run("--resume", *film, "--gamma", 2, "--on-error", "hold").code == 0
+    assert unfinished.run("--resume", *film, "--on-error", "hold").code == 0
     assert unfinished.files == unharmed
 
 

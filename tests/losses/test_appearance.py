@@ -13,6 +13,7 @@ from vnca.colour import linear_to_srgb, srgb_to_linear
 from vnca.errors import OptionError, ShapeError
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import Appearance, AppearanceConfig, AppearanceLoss
+from vnca.losses.pixels import luminance
 from vnca.typing import FloatArray
 
 SIZE = 48
@@ -264,3 +265,30 @@ def test_misshapen_input_is_refused(vgg: VGG16, loss: AppearanceLoss) -> None:
         AppearanceLoss(vgg, np.zeros((40, 40), np.float32), AppearanceConfig(layers=LAYERS), SIZE)
     with pytest.raises(ShapeError, match="opacity"):
         loss(noise(), torch.ones(1, SIZE, SIZE + 1), generator())
+
+
+@pytest.mark.usefixtures("unchecked_shapes")
+def test_what_is_compared_in_grey_may_be_a_picture_of_its_own(
+    vgg: VGG16, painting: FloatArray, loss: AppearanceLoss
+) -> None:
+    picture, opaque = noise(), torch.ones(1, SIZE, SIZE)
+    luma = luminance(picture)
+    assert loss(picture, opaque, generator(), luma).total == measured(loss, picture).total
+    # Only what is in grey is another, and only that has a gradient.
+    other = luminance(noise(5)).requires_grad_()
+    config = AppearanceConfig(layers=LAYERS, colour=False, pixels=0.0)
+    grey_alone = AppearanceLoss(vgg, painting, config, SIZE)
+    total = grey_alone(picture, opaque, generator(), other).total
+    assert total == measured(grey_alone, noise(5)).total
+    total.backward()
+    assert other.grad is not None
+    assert other.grad.abs().sum() > 0
+    with pytest.raises(ShapeError, match="grey"):
+        loss(picture, opaque, generator(), luma[..., 1:])
+
+
+def test_a_density_in_grey_that_nothing_looks_at_is_refused() -> None:
+    assert AppearanceConfig(grey_source="density").shows_density
+    assert not AppearanceConfig().shows_density
+    with pytest.raises(OptionError, match=r"--appearance\.grey-source"):
+        AppearanceConfig(grey=False, grey_source="density")

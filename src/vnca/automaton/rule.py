@@ -87,6 +87,10 @@ class Scales:
             if not 0 < getattr(self, name) < math.inf:
                 raise OptionError(f"scale '{name}' {getattr(self, name)}: must be positive")
 
+    def extinction(self, cell_length: float) -> float:
+        """Of density 1 in a file, per length of its world, where cells are so long."""
+        return self.gamma / (self.density * cell_length)
+
 
 def density_scale(density: FloatArray) -> float:
     """The density that counts as 1: the 99th percentile of what is not empty."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from vnca.automaton.model import Model
 from vnca.cli.film import FilmConfig
 from vnca.cli.options import parse, say
 from vnca.cli.render import Render, strip
@@ -74,10 +73,8 @@ def demonstrate(options: Demo) -> None:
         asked = f"{frames // 4}-{frames}"
         refine = 1 if options.quick else 2
         paint(Stylize(run_folder, sequence, painted, frames=asked, preview=film, refine=refine))
-        scales = Model.load(run_folder).rule.refined(refine).scales
-        gamma = scales.gamma / scales.density
         view = FilmConfig(rows=SHEET_SIZE, columns=SHEET_SIZE)
-        shown = Render(str(painted), sheet, frames=asked, gamma=gamma, film=view)
+        shown = Render(str(painted), sheet, frames=asked, film=view)
         write_image(sheet, _sheet(picture, shown))
     minutes, seconds = divmod(round(time.monotonic() - start), 60)
     say(f"done in {minutes}:{seconds:02}")

@@ -31,6 +31,8 @@ from vnca.training.preview import preview_sheet
 from vnca.training.run import RunFolder
 from vnca.typing import FloatArray
 
+FINGERPRINTS = "fingerprints"
+"""What says in the configuration of a run what its inputs were, wherever their files lie."""
 THUMBNAIL = 96
 """Rows and columns of the style picture kept in a model file."""
 
@@ -113,7 +115,8 @@ class Session:
             if checkpoint is None:
                 self._keep()
             inputs = {name: self.asked[name] for name in ("frame", "style") if name in self.asked}
-            self.folder.start(trainer.config, {**self.training, "inputs": inputs})
+            facts = {**self.training, "inputs": inputs, FINGERPRINTS: self.inputs}
+            self.folder.start(trainer.config, facts)
             say(
                 f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
                 f"features '{self.training['features']}', {self.training['device']}"

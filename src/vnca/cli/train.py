@@ -39,6 +39,8 @@ from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.memory import memory_budget
 from vnca.training.smoke import smoke_trainer
 from vnca.training.smoke_scene import smoke_bounds, view_width
+from vnca.typing import FloatArray
+from vnca.volume import Volume
 
 COMMAND = "train"
 TEXTURE_FOLDER = "texture"
@@ -128,7 +130,8 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
     with fitting(config, "this frame"):
         budget = memory_budget(options.memory_budget)
         trainer = smoke_trainer(smoke, style, config, vgg, device=device, memory_budget=budget)
-    width = view_width(smoke_bounds(smoke, trainer.rule().scales.density))
+    bounds = smoke_bounds(smoke, trainer.rule().scales.density)
+    width = view_width(bounds, smoke.index_to_world)
     training = {
         "frame": options.frame.name,
         "style": options.style.name,
@@ -139,16 +142,13 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         PICTURE_CELLS: round(config.appearance.style_scale * width, 2),
         **judged_by(vgg),
     }
-    frame = [smoke.density, smoke.origin]
-    if smoke.velocity is not None:
-        frame.append(smoke.velocity)
     session = Session(
         command=COMMAND,
         trainer=trainer,
         folder=folder,
         style=style,
         training=training,
-        inputs=fingerprints(style, config, vgg, frame=frame),
+        inputs=training_inputs(smoke, style, config, vgg),
         asked=asked(dataclasses.replace(options, smoke=smoke_format)),
         preview_every=options.preview_every,
     )
@@ -172,6 +172,16 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         notes.append(f"{options.frame}: nothing moves in it; its texture is not taught to move")
     session.run(checkpoint, *notes)
     return options.out
+
+
+def training_inputs(
+    smoke: Volume, style: FloatArray, config: TrainConfig, vgg: VGG16
+) -> dict[str, str]:
+    """What tells a training on smoke from others: the `fingerprints` of what goes into it."""
+    frame = [smoke.density, smoke.origin]
+    if smoke.velocity is not None:
+        frame.append(smoke.velocity)
+    return fingerprints(style, config, vgg, frame=frame)
 
 
 def _given(path: Path, wanted: RuleConfig) -> Rule:

@@ -227,15 +227,6 @@ def _density(survey: Survey) -> Iterable[Measure]:
         unstylized=0.0,
         more={"frames": moved},
     )
-    yield Measure(
-        "density.appeared",
-        "Smoke out of nowhere",
-        "Cells that hold smoke and held none: there must be none.",
-        float(sum(change.appeared for change in changes)),
-        "cells",
-        "lower",
-        unstylized=0.0,
-    )
 
 
 def _by_frame(frames: Sequence[int], values: Sequence[float]) -> dict[int, float]:

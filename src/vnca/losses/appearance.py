@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import torch
 from jaxtyping import Float, Int
@@ -33,7 +33,10 @@ class AppearanceConfig:
     colour: bool = True
     """Compare the pictures in colour."""
     grey: bool = True
-    """Compare the pictures in grey, which shapes the density."""
+    """Compare the pictures in grey, too."""
+    grey_source: Literal["luma", "density"] = "luma"
+    """What is seen in grey: the luma of the coloured view, which colour alone can satisfy, or as in
+    the paper the density, I = Σ d τ, which nothing but a change of the density can."""
     samples: int = 1024
     """Positions drawn in each layer for style matching, from either picture."""
     style_scale: float = 1.0
@@ -58,8 +61,18 @@ class AppearanceConfig:
                 f"--appearance.opacity-threshold {self.opacity_threshold}: must be at least 0 "
                 "and below 1"
             )
+        if self.grey_source == "density" and not self.grey:
+            raise OptionError(
+                "--appearance.grey-source density: nothing is compared in grey; "
+                "add --appearance.grey"
+            )
         if self.style_scale <= 0:
             raise OptionError(f"--appearance.style-scale {self.style_scale}: must be positive")
+
+    @property
+    def shows_density(self) -> bool:
+        """Whether pictures of the density itself are compared."""
+        return self.grey and self.grey_source == "density"
 
 
 class Appearance(NamedTuple):
@@ -135,20 +148,27 @@ class AppearanceLoss:
         picture: Float[Tensor, "b 3 r c"],
         opacity: Float[Tensor, "b r c"],
         generator: torch.Generator,
+        grey: Float[Tensor, "b 3 r c"] | None = None,
     ) -> Appearance:
         """Mean over the pictures of the summed distances over the layers.
 
-        Differentiable in `picture`; `opacity` only chooses positions. A picture without smoke
-        contributes zero.
+        Differentiable in `picture` and `grey`; `opacity` only chooses positions. A picture without
+        smoke contributes zero.
 
         Args:
             picture: sRGB in 0–1.
             opacity: 0–1.
             generator: Draws the positions.
+            grey: What is compared in grey, sRGB in 0–1 with equal channels; the luma of `picture`
+                unless given.
 
         Raises:
-            ShapeError: If picture and opacity differ in size.
+            ShapeError: If picture, opacity and grey differ in size.
         """
+        if grey is not None and grey.shape != picture.shape:
+            raise ShapeError(
+                f"grey: expected {tuple(picture.shape)} like the picture, got {tuple(grey.shape)}"
+            )
         if opacity.shape != (picture.shape[0], *picture.shape[2:]):
             raise ShapeError(
                 f"opacity: expected {(picture.shape[0], *picture.shape[2:])} to match the "
@@ -165,7 +185,7 @@ class AppearanceLoss:
                 )
                 terms["pixels"] = terms["pixels"] + palettes
         if config.style or config.moments:
-            for ours, style in self._compared(picture, opacity):
+            for ours, style in self._compared(picture, grey, opacity):
                 if config.moments:
                     distance = moment_distance(moments(ours), style.moments)
                     terms["moments"] = terms["moments"] + distance
@@ -179,10 +199,10 @@ class AppearanceLoss:
         return Appearance(torch.stack(list(terms.values())).sum(), terms)
 
     def _compared(
-        self, picture: Tensor, opacity: Tensor
+        self, picture: Tensor, grey: Tensor | None, opacity: Tensor
     ) -> Iterator[tuple[Float[Tensor, "_ _"], _Layer]]:
         """Feature sets of the smoke, each with the style's counterpart."""
-        for maps, styles in zip(self._features(picture), self._layers, strict=True):
+        for maps, styles in zip(self._features(picture, grey), self._layers, strict=True):
             chosen = self._chosen(opacity, maps[0])
             for kind, style in zip(maps, styles, strict=True):
                 for features in self._shown(kind, chosen):
@@ -192,9 +212,10 @@ class AppearanceLoss:
         count, device = len(features), features.device
         return features[sample_positions(count, self.config.samples, generator, device)]
 
-    def _features(self, picture: Tensor) -> list[list[Tensor]]:
+    def _features(self, picture: Tensor, grey: Tensor | None = None) -> list[list[Tensor]]:
         """Per layer, the maps of the picture in colour, in grey, or both."""
-        kinds = [picture] * self.config.colour + [luminance(picture)] * self.config.grey
+        grey = luminance(picture) if grey is None else grey
+        kinds = [picture] * self.config.colour + [grey] * self.config.grey
         maps = self._vgg.features(torch.cat(kinds), self.config.layers)
         return [list(layer.split(len(picture))) for layer in maps]
 

@@ -73,6 +73,8 @@ class TextureConfig(CourseConfig):
             raise OptionError(
                 "--position-prior, --density-prior, --velocity-prior: a solid texture has none"
             )
+        if self.appearance.shows_density:
+            raise OptionError("--appearance.grey-source density: a solid texture has no density")
         if not SMALLEST <= self.block <= LARGEST:
             raise OptionError(f"--block {self.block}: must be from {SMALLEST} to {LARGEST} cells")
 

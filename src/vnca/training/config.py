@@ -28,7 +28,8 @@ class ViewConfig:
     """Integrand: emission and absorption, or the paper's as printed."""
     cell_opacity: float = 0.95
     """Without a given gamma, one is chosen that makes a typical cell this opaque: high shows the
-    texture of the surface, low mixes many cells along a ray."""
+    texture of the surface, low mixes many cells along a ray. For the paper's integrand it is chosen
+    so that typical smoke is as bright as its colour."""
     gamma: float | None = None
     """Extinction of density 1, per cell; chosen from the frame unless given."""
 

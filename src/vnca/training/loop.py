@@ -226,7 +226,10 @@ class Trainer:
         self._steps += steps
         sight = scene.sight(self._random)
         pictures, opacity = scene.pictures(state, sight, self.background)
-        appearance = self._appearance(pictures, opacity, self._generator)
+        grey = None
+        if config.appearance.shows_density:
+            grey = scene.density_pictures(state, sight, self.background)
+        appearance = self._appearance(pictures, opacity, self._generator, grey)
         others = {"overflow": config.overflow * self._overflow(state[:-1])}
         if self._motion is not None and before.any():  # a state of zeros has no texture to move
             others["motion"] = self._motion.loss(

@@ -61,11 +61,12 @@ def memory_needs(scene: Scene[Any], config: CourseConfig) -> MemoryNeeds:
     state = cells * config.rule.channels * 4
     mask = cells * config.rule.update_probability * 4
     sample = SAMPLE_BYTES["cpu" if scene.priors.device.type == "cpu" else "cuda"]
-    seen = config.pictures
+    seen, looks = config.pictures, 1 + config.appearance.shows_density
+    pixel = PIXEL_BYTES + looks * scene.samples * sample
     return MemoryNeeds(
         pool=config.pool.size * state,
         state=round(state + mask),
-        pictures=round(seen.count * seen.size**2 * (PIXEL_BYTES + scene.samples * sample)),
+        pictures=round(seen.count * seen.size**2 * pixel),
         work=cells * CELL_BYTES + prod(box.shape) * BOX_BYTES + STATES_AT_WORK * state,
     )
 

@@ -68,6 +68,14 @@ class Scene(ABC, Generic[Sight]):
             sRGB `[b, 3, r, c]` over the background, and opacity `[b, r, c]`.
         """
 
+    def density_pictures(self, state: Tensor, sight: Sight, background: Tensor) -> Tensor | None:
+        """The density that `pictures` shows coloured, in grey: sRGB `[b, 3, r, c]`.
+
+        Differentiable in the state. None of a scene whose density is not painted.
+        """
+        del state, sight, background
+        return None
+
     @abstractmethod
     def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
         """Pictures for people to look at, linear RGB `[size, size, 3]`, from where they expect."""

@@ -9,12 +9,12 @@ from vnca.features.flow import FlowNetwork
 from vnca.features.vgg import VGG16
 from vnca.io.orientation import on_lattice
 from vnca.lattice import Lattice, Region
-from vnca.render.brightness import gamma_for_cell_opacity
-from vnca.training.config import TrainConfig
+from vnca.render.brightness import gamma_for_cell_opacity, gamma_for_own_colour
+from vnca.training.config import TrainConfig, ViewConfig
 from vnca.training.loop import Trainer
 from vnca.training.motion import MotionSupervision
 from vnca.training.smoke_scene import SmokeScene, velocity_scale
-from vnca.typing import FloatArray
+from vnca.typing import AnyArray, FloatArray
 from vnca.volume import Volume
 
 
@@ -55,7 +55,15 @@ def smoke_trainer(
 def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:
     """Normalisers from the frame a rule is trained on."""
     density = density_scale(smoke.density)
-    gamma = config.view.gamma or gamma_for_cell_opacity(
-        smoke.density / density, config.view.cell_opacity
+    return Scales(
+        density=density,
+        velocity=velocity_scale(smoke),
+        gamma=config.view.gamma or _gamma(smoke.density / density, config.view),
     )
-    return Scales(density=density, velocity=velocity_scale(smoke), gamma=gamma)
+
+
+def _gamma(density: AnyArray, view: ViewConfig) -> float:
+    """What suits the integrand that training looks with."""
+    if view.mode == "paper":
+        return gamma_for_own_colour(density)
+    return gamma_for_cell_opacity(density, view.cell_opacity)
