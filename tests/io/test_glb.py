@@ -112,7 +112,7 @@ def test_zeros_without_bytes_are_not_made_without_end() -> None:
 @pytest.mark.parametrize(
     ("document", "line"),
     [
-        ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "compressed"),
+        ({"extensionsRequired": ["EXT_meshopt_compression"]}, r"compressed \(EXT_meshopt"),
         ({"buffers": [{"uri": "other.bin", "byteLength": 4}]}, "outside the file"),
     ],
 )
