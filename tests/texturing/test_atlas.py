@@ -29,7 +29,8 @@ def plane(uv: np.ndarray | None = None) -> trimesh.Trimesh:
 
 def test_texels_lie_where_the_surface_is(tmp_path: Path) -> None:
     mesh = opened(tmp_path, plane())
-    made, texels = unwrapped(mesh, "auto", size=64)
+    atlas = unwrapped(mesh, "auto", size=64)
+    made, texels = atlas.unwrappings, atlas.texels
     assert made[0].source is None
     assert len(texels.texel) == 64**2
     row, column = np.divmod(texels.texel, 64)
@@ -40,7 +41,7 @@ def test_texels_lie_where_the_surface_is(tmp_path: Path) -> None:
 
 def test_the_gutter_goes_on_with_the_plane(tmp_path: Path) -> None:
     mesh = opened(tmp_path, plane(0.25 + 0.5 * plane().vertices[:, :2]))
-    _, texels = unwrapped(mesh, "auto", size=64)
+    texels = unwrapped(mesh, "auto", size=64).texels
     row, column = np.divmod(texels.texel, 64)
     assert len(texels.texel) == (32 + 2 * GUTTER) ** 2
     np.testing.assert_allclose(texels.points[:, 0], (column + 0.5) / 32 - 0.5, atol=1e-6)
@@ -59,7 +60,8 @@ def test_uvs_that_cannot_carry_a_solid_texture_are_replaced(tmp_path: Path, uv: 
     mesh = opened(tmp_path, plane())
     (surface,) = mesh.surfaces
     object.__setattr__(surface, "uv", uv)
-    made, texels = unwrapped(mesh, "auto", size=64)
+    atlas = unwrapped(mesh, "auto", size=64)
+    made, texels = atlas.unwrappings, atlas.texels
     assert made[0].source is not None
     assert texels.overlap == 0
     with pytest.raises(GridError, match=r"mesh\.glb: its UVs cannot be used"):
@@ -67,10 +69,10 @@ def test_uvs_that_cannot_carry_a_solid_texture_are_replaced(tmp_path: Path, uv: 
 
 
 def test_new_uvs_are_made_where_asked_for_or_missing(tmp_path: Path) -> None:
-    made, _ = unwrapped(opened(tmp_path, plane()), "always", size=64)
+    made = unwrapped(opened(tmp_path, plane()), "always", size=64).unwrappings
     assert made[0].source is not None
     box = opened(tmp_path, trimesh.creation.box())
-    made, _ = unwrapped(box, "auto", size=64)
+    made = unwrapped(box, "auto", size=64).unwrappings
     assert made[0].source is not None
     with pytest.raises(GridError, match="has none"):
         unwrapped(box, "never", size=64)
@@ -80,7 +82,8 @@ def test_several_objects_share_one_texture_without_overlap(tmp_path: Path) -> No
     scene = trimesh.Scene([trimesh.creation.icosphere(2), trimesh.creation.box()])
     scene.export(tmp_path / "two.glb")
     mesh = read_mesh(tmp_path / "two.glb")
-    made, texels = unwrapped(mesh, "auto", size=256)
+    atlas = unwrapped(mesh, "auto", size=256)
+    made, texels = atlas.unwrappings, atlas.texels
     assert len(made) == 2
     assert texels.overlap == 0
     # Texels lie on the ball of radius 1 or on the box, but for the gutter.
@@ -96,7 +99,8 @@ def test_several_objects_share_one_texture_without_overlap(tmp_path: Path) -> No
 
 def test_every_face_owns_a_texel_even_where_it_is_smaller_than_one(tmp_path: Path) -> None:
     mesh = opened(tmp_path, trimesh.creation.icosphere(4))  # 5120 faces for 4096 texels
-    made, texels = unwrapped(mesh, "always", size=64)
+    atlas = unwrapped(mesh, "always", size=64)
+    made, texels = atlas.unwrappings, atlas.texels
     assert np.abs(np.linalg.norm(texels.points, axis=1) - 1).max() < 0.3
     uv = made[0].uv[made[0].faces].mean(1)
     column, row = np.floor(64 * np.clip(uv, 0, 1 - 1e-9)).astype(int).T
@@ -110,7 +114,8 @@ def test_faces_without_area_and_needles_do_no_harm(tmp_path: Path) -> None:
     needle = [[len(ball.vertices) + i for i in range(3)]]
     broken = trimesh.Trimesh(points, np.concatenate([faces, needle]), process=False)
     mesh = opened(tmp_path, broken)
-    made, texels = unwrapped(mesh, "auto", size=256)
+    atlas = unwrapped(mesh, "auto", size=256)
+    made, texels = atlas.unwrappings, atlas.texels
     assert np.isfinite(texels.points).all()
     assert made[0].faces.shape == (324, 3)
     assert len(texels.texel)
@@ -118,7 +123,7 @@ def test_faces_without_area_and_needles_do_no_harm(tmp_path: Path) -> None:
 
 def test_meshes_far_away_and_tiny_are_unwrapped_as_others(tmp_path: Path) -> None:
     small = trimesh.creation.icosphere(2, radius=1e-4)
-    _, texels = unwrapped(opened(tmp_path, small), "auto", size=128)
+    texels = unwrapped(opened(tmp_path, small), "auto", size=128).texels
     assert len(texels.texel) > 0.4 * 128**2
 
 
@@ -132,6 +137,7 @@ def test_a_missing_xatlas_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_a_map_of_nothing_but_specks_is_not_empty(tmp_path: Path) -> None:
     mesh = opened(tmp_path, plane(1e-4 * plane().vertices[:, :2]))
     (surface,) = mesh.surfaces
-    made, texels = unwrapped(mesh, "never", size=64)
+    atlas = unwrapped(mesh, "never", size=64)
+    made, texels = atlas.unwrappings, atlas.texels
     assert len(texels.texel) >= 1
     assert texel_map([surface], made, 64).overlap == 0
