@@ -28,8 +28,8 @@ def decompress(glb: Glb) -> None:
                 compressed = primitive.get("extensions", {}).pop(EXTENSION, None)
                 if compressed is None:
                     continue
-                position = glb.item("accessors", primitive["attributes"]["POSITION"])
-                if "bufferView" not in position:
+                stored = [primitive["attributes"][name] for name in compressed["attributes"]]
+                if not all("bufferView" in glb.item("accessors", each) for each in stored):
                     _decompress(glb, primitive, compressed)
                 if not primitive["extensions"]:
                     del primitive["extensions"]

@@ -107,7 +107,7 @@ def _pixels(header: Mapping[str, Any]) -> int:
 
 def _layers(names: set[str]) -> Iterator[str]:
     """What stands before the channel names of each layer that is a picture."""
-    for name in sorted(names, key=len):
+    for name in sorted(names):
         before, last = name[:-1], name[-1:]
         if before and not before.endswith("."):
             continue

@@ -194,7 +194,8 @@ def _ply_shape(ply: PlyMesh, resolver: Any, trimesh: Any) -> Any:
             # Without it the mesh can be textured all the same.
             with suppress(Exception):
                 picture = Image.open(BytesIO(resolver.get(ply.picture)), formats=FORMATS)
-        shape.visual = trimesh.visual.TextureVisuals(uv=ply.uv, image=picture)
+        material = trimesh.visual.material.PBRMaterial(baseColorTexture=picture)
+        shape.visual = trimesh.visual.TextureVisuals(uv=ply.uv, material=material)
     return shape
 
 

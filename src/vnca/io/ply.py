@@ -136,9 +136,9 @@ def _header(data: bytes) -> tuple[list[_Element], str | None, bytes]:
 
 
 def _dtype(name: str, order: str) -> np.dtype:
-    if order == "text":
-        return np.dtype("f8")
-    return np.dtype(order + _TYPES[name])
+    if name not in _TYPES:
+        raise ValueError(f"its header names an unknown type '{name}'")
+    return np.dtype("f8") if order == "text" else np.dtype(order + _TYPES[name])
 
 
 def _columns(element: _Element, data: bytes, at: int) -> tuple[dict[str, AnyArray | _Lists], int]:
