@@ -254,6 +254,17 @@ def test_damaged_pictures_are_refused(tmp_path, name) -> None:
         read_image(tmp_path / name)
 
 
+def test_decoders_do_not_speak_for_themselves(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    data = bytearray(saved(PIXELS, "TIFF", compression="tiff_lzw"))
+    data[len(data) // 2 :] = bytes(len(data) - len(data) // 2)
+    (tmp_path / "a.tif").write_bytes(data)
+    with pytest.raises(FileFormatError, match=r"a\.tif"):
+        read_image(tmp_path / "a.tif")
+    assert capfd.readouterr() == ("", "")
+
+
 @pytest.mark.parametrize("limit", [300, 150])
 def test_decompression_bombs_are_refused(tmp_path, monkeypatch, limit) -> None:
     write_image(tmp_path / "a.png", np.zeros((20, 20, 3)))

@@ -3,11 +3,7 @@
 Reference: Academy Software Foundation, Technical Introduction to OpenEXR.
 """
 
-import os
-import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -44,8 +40,7 @@ def read_exr(path: Path, most_pixels: int) -> tuple[FloatArray, FloatArray | Non
         BackendUnavailableError: If OpenEXR is not installed.
     """
     library = _library(path, "reading")
-    with _quiet():
-        heads = library.File(str(path), header_only=True).parts
+    heads = library.File(str(path), header_only=True).parts
     values = sum(_pixels(part.header) * len(part.header["channels"]) for part in heads)
     if values > _CHANNELS * most_pixels:
         raise FileFormatError(
@@ -60,8 +55,7 @@ def read_exr(path: Path, most_pixels: int) -> tuple[FloatArray, FloatArray | Non
         for layer in _layers({channel.name for channel in part.header["channels"]})
     ]
     number, layer = _chosen(path, layers)
-    with _quiet():
-        parts = library.File(str(path), separate_channels=True).parts
+    parts = library.File(str(path), separate_channels=True).parts
     if len(parts) < len(heads):  # Those that it cannot read are left out.
         raise FileFormatError(f"{path}: the picture is damaged (its pixels cannot be read)")
     part = parts[number]
@@ -107,24 +101,6 @@ def _library(path: Path, doing: str) -> Any:
             f"{path}: {doing} OpenEXR needs the OpenEXR package: pip install 'vnca[train]'"
         ) from error
     return OpenEXR
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep the library from printing what it finds wrong: a line of ours says it.
-
-    Some of it comes from C++, past `sys.stderr`, so the file descriptor itself is led away.
-    """
-    sys.stderr.flush()
-    nowhere, kept = os.open(os.devnull, os.O_WRONLY), os.dup(2)
-    try:
-        os.dup2(nowhere, 2)
-        with redirect_stdout(StringIO()):
-            yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
 
 
 def _pixels(header: Mapping[str, Any]) -> int:

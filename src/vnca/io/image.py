@@ -3,9 +3,13 @@
 Where there is an alpha channel, colour in memory is premultiplied by it.
 """
 
+import os
 import re
+import sys
 import warnings
-from io import BytesIO
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
 
@@ -179,18 +183,9 @@ def _read(path: Path) -> tuple[FloatArray, FloatArray | None]:
     # From memory: Pillow asks a file for as many bytes as a chunk says it has, and Python makes
     # room for them all before it reads.
     data = path.read_bytes()
-    most = Image.MAX_IMAGE_PIXELS or 2**63
     try:
-        if data.startswith(exr.MAGIC):
-            colour, alpha = exr.read_exr(path, most)
-            return _exposed(path, colour), None if alpha is None else np.clip(alpha, 0, 1)
-        if data.startswith(hdr.MAGICS):
-            return _exposed(path, hdr.read_hdr(path, data, most)), None
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            warnings.filterwarnings("ignore", category=UserWarning, module="PIL")
-            with Image.open(BytesIO(data), formats=_formats(path, data)) as image:
-                return _linear(path, ImageOps.exif_transpose(image))
+        with _quiet():
+            return _decoded(path, data)
     except Image.UnidentifiedImageError as error:
         raise FileFormatError(
             f"{path}: expected a picture ({_READ}), found {kind_of(data)}"
@@ -203,6 +198,40 @@ def _read(path: Path) -> tuple[FloatArray, FloatArray | None]:
         raise
     except Exception as error:  # Decoders raise whatever a damaged file makes them trip over.
         raise FileFormatError(f"{path}: the picture is damaged ({error})") from error
+
+
+def _decoded(path: Path, data: bytes) -> tuple[FloatArray, FloatArray | None]:
+    most = Image.MAX_IMAGE_PIXELS or 2**63
+    if data.startswith(exr.MAGIC):
+        colour, alpha = exr.read_exr(path, most)
+        if alpha is not None:
+            alpha = np.clip(np.nan_to_num(alpha, nan=0.0), 0, 1)
+        return _exposed(path, colour), alpha
+    if data.startswith(hdr.MAGICS):
+        return _exposed(path, hdr.read_hdr(path, data, most)), None
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Image.DecompressionBombWarning)
+        warnings.filterwarnings("ignore", category=UserWarning, module="PIL")
+        with Image.open(BytesIO(data), formats=_formats(path, data)) as image:
+            return _linear(path, ImageOps.exif_transpose(image))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep decoders from printing what they find wrong: a line of ours says it.
+
+    libtiff and OpenEXR do so past `sys.stderr`, so the file descriptor itself is led away.
+    """
+    sys.stderr.flush()
+    nowhere, kept = os.open(os.devnull, os.O_WRONLY), os.dup(2)
+    try:
+        os.dup2(nowhere, 2)
+        with redirect_stdout(StringIO()):
+            yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def _formats(path: Path, data: bytes) -> tuple[str, ...]:
