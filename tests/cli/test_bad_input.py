@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from safetensors.numpy import load_file, save_file
 
 from vnca.automaton.model import MODEL_NAME
@@ -114,6 +115,29 @@ def test_a_picture_that_is_none(
     style.write_bytes(content)
     assert f"{style}: " in vnca("train", frame, style, "--out", out).complaint
     assert "picture" in vnca("demo", "--style", style, "--out", out).complaint
+
+
+@pytest.mark.parametrize(
+    ("size", "colour", "line"),
+    [
+        ((64, 64), (0, 0, 0, 0), "fully transparent"),
+        ((64, 64), (9, 99, 199, 255), "a single colour"),
+        ((1, 1), (9, 99, 199, 255), "1×1 pixels"),
+    ],
+)
+@pytest.mark.usefixtures("no_long_work")
+def test_a_picture_from_which_nothing_can_be_learned(
+    vnca: Vnca, frame: Path, style: Path, out: Path, size: Any, colour: Any, line: str
+) -> None:
+    Image.new("RGBA", size, colour).save(style)
+    for arguments in (
+        ("train", frame, style, "--out", out),
+        ("texture", "train", style, "--out", out),
+        ("demo", "--style", style, "--out", out),
+    ):
+        complaint = vnca(*arguments).complaint
+        assert f"{style}: the picture " in complaint
+        assert line in complaint
 
 
 def test_a_file_of_smoke_of_another_kind(vnca: Vnca, model: Path, style: Path, out: Path) -> None:

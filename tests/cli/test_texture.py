@@ -92,6 +92,20 @@ def test_meshes_of_every_format_are_textured(
     assert picture.std() > 5
 
 
+def test_unusable_uvs_are_told_of_and_replaced(vnca: Vnca, texture: Path, tmp_path: Path) -> None:
+    source = Path(__file__).parents[1] / "data/uv_zero.glb"
+    out = tmp_path / "out.glb"
+    arguments = ("texture", "bake", texture, source, "--out", out, "--size", 64, *SMALL)
+    assert "0.00% of the texture" in vnca(*arguments, "--unwrap", "never").complaint
+    assert not out.exists()
+    outcome = vnca(*arguments)
+    assert outcome.code == 0, outcome.err
+    assert "uv_zero.glb: its UVs cannot be used (they cover 0.00% of the texture)" in outcome.err
+    assert "new UVs" in outcome.err
+    (shape,) = trimesh.load_scene(out).geometry.values()
+    assert np.asarray(shape.visual.material.baseColorTexture).std() > 5
+
+
 def test_same_seed_same_texture_and_another_seed_another(
     vnca: Vnca, texture: Path, mesh: Path, tmp_path: Path
 ) -> None:

@@ -19,7 +19,7 @@ from vnca.cli.sequence import beside, read_alone
 from vnca.cli.session import choose_device
 from vnca.errors import OptionError
 from vnca.features.vgg import VGG16
-from vnca.io.image import read_image
+from vnca.io.image import read_style
 from vnca.io.smoke import SmokeFormat
 from vnca.kernels.update.native import default_threads
 from vnca.simulate.scenes import simulate
@@ -129,7 +129,7 @@ def _smoke(options: BenchTrain) -> Volume:
 
 def _style(options: BenchTrain) -> FloatArray:
     with as_file(files("vnca.data") / STYLE) as own:
-        return read_image(options.style or own)
+        return read_style(options.style or own)
 
 
 def _table(rows: Rows) -> list[str]:

@@ -13,7 +13,7 @@ from vnca.cli.sequence import open_sequence
 from vnca.cli.simulate import Simulate, write_simulation
 from vnca.cli.stylize import Stylize, paint
 from vnca.cli.train import Train, train
-from vnca.io.image import fit, read_image, write_image
+from vnca.io.image import fit, read_style, write_image
 from vnca.io.sheet import contact_sheet
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.typing import FloatArray
@@ -56,7 +56,7 @@ def demonstrate(options: Demo) -> None:
     film, sheet = options.out / "demo.mp4", options.out / "demo.png"
     with as_file(files("vnca.data") / STYLE) as own:
         style = options.style or own
-        picture = read_image(style)
+        picture = read_style(style)
         write_simulation(Simulate("plume", smoke, resolution, frames, options.seed))
         trained = smoke / f"plume_{3 * frames // 4:04d}.vdb"
         train(

@@ -42,7 +42,7 @@ class Ablation:
     frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
     """A frame of smoke with velocity."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
-    """The picture: PNG, JPEG or WebP."""
+    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
     ablation: Literal["velocity"]
     """What is taken away."""
     out: Path

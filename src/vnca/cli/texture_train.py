@@ -22,7 +22,7 @@ from vnca.cli.session import (
 )
 from vnca.cli.texture_block import KIND
 from vnca.features.vgg import VGG16
-from vnca.io.image import read_image
+from vnca.io.image import read_style
 from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.orientation import UpAxis
 from vnca.texturing.config import PRESETS, TextureConfig
@@ -42,7 +42,7 @@ class TrainTexture(TrainingOptions):
     """
 
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
-    """The picture: PNG, JPEG or WebP."""
+    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
     mesh: Path | None = None
     """Look at this mesh too while training: GLB, OBJ, PLY or STL."""
     up_axis: UpAxis | None = None
@@ -82,7 +82,7 @@ def train(options: TrainTexture, checkpoint: Checkpoint | None = None) -> Path:
             diverges, or memory runs out.
     """
     folder = run_folder(options.out, overwrite=options.overwrite, checkpoint=checkpoint)
-    style = read_image(options.style)
+    style = read_style(options.style)
     device = choose_device(options.device)
     mesh = read_mesh(options.mesh, options.up_axis) if options.mesh else None
     config = options.config

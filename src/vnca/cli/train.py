@@ -29,7 +29,7 @@ from vnca.cli.session import (
 from vnca.errors import GridError, OptionError
 from vnca.features.vgg import VGG16
 from vnca.files import remove_file
-from vnca.io.image import read_image
+from vnca.io.image import read_style
 from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY
 from vnca.texturing.beginning import SHAPE, SHARES, beginning_config, deaf_to_priors
@@ -57,7 +57,7 @@ class Train(TrainingOptions):
     frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
-    """The picture: PNG, JPEG or WebP."""
+    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
     preset: Literal["draft", "standard", "paper"] = "draft"
     """Values of all options below that are not given."""
     texture: float | None = None
@@ -109,7 +109,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
             diverges, or memory runs out.
     """
     folder = run_folder(options.out, overwrite=options.overwrite, checkpoint=checkpoint)
-    style = read_image(options.style)
+    style = read_style(options.style)
     device = choose_device(options.device)
     smoke_format = beside(options.frame, options.smoke)
     smoke = read_alone(options.frame, smoke_format)
