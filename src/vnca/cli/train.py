@@ -13,7 +13,6 @@ from vnca.automaton.model import MODEL_NAME, Model
 from vnca.automaton.rule import Rule, RuleConfig
 from vnca.cli import texture_train
 from vnca.cli.options import chosen, is_given, parse, say
-from vnca.cli.recorded import PICTURE_CELLS
 from vnca.cli.sequence import beside
 from vnca.cli.session import (
     ResumeOptions,
@@ -23,11 +22,11 @@ from vnca.cli.session import (
     choose_device,
     fitting,
     interrupted,
-    judged_by,
     run_folder,
+    shown_and_judged,
 )
 from vnca.errors import GridError, OptionError
-from vnca.features.vgg import VGG16
+from vnca.features.load import load_network
 from vnca.files import remove_file
 from vnca.io.image import read_image
 from vnca.io.smoke import SmokeFormat, read_smoke
@@ -37,7 +36,6 @@ from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.memory import memory_budget
 from vnca.training.smoke import smoke_trainer
-from vnca.training.smoke_scene import smoke_bounds, view_width
 
 COMMAND = "train"
 TEXTURE_FOLDER = "texture"
@@ -116,11 +114,10 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         )
     config = options.config
     torch.use_deterministic_algorithms(True)
-    vgg = VGG16.load(config.features, device)
+    network = load_network(config.features, device)
     with fitting(config, "this frame"):
         budget = memory_budget(options.memory_budget)
-        trainer = smoke_trainer(smoke, style, config, vgg, device=device, memory_budget=budget)
-    width = view_width(smoke_bounds(smoke, trainer.rule().scales.density))
+        trainer = smoke_trainer(smoke, style, config, network, device=device, memory_budget=budget)
     training = {
         "frame": options.frame.name,
         "style": options.style.name,
@@ -128,8 +125,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         "seed": config.seed,
         "device": str(device),
         "smoke": dataclasses.asdict(smoke_format),
-        PICTURE_CELLS: round(config.appearance.style_scale * width, 2),
-        **judged_by(vgg),
+        **shown_and_judged(trainer, network),
     }
     frame = [smoke.density, smoke.origin]
     if smoke.velocity is not None:
@@ -140,7 +136,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         folder=folder,
         style=style,
         training=training,
-        inputs=fingerprints(style, config, vgg, frame=frame),
+        inputs=fingerprints(style, config, network, frame=frame),
         asked=asked(dataclasses.replace(options, smoke=smoke_format)),
         preview_every=options.preview_every,
     )
@@ -148,7 +144,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         if checkpoint is not None:
             checkpoint.require(session.inputs, folder.path / CHECKPOINT_NAME)
         share = SHARES[options.preset] if options.texture is None else options.texture
-        beginning = beginning_config(config, share, width)
+        beginning = beginning_config(config, share, trainer.picture_cells)
         if options.begin_with is not None:
             trainer.begin_with(deaf_to_priors(_given(options.begin_with, config.rule)))
         elif beginning is not None:

@@ -4,7 +4,7 @@ import torch
 
 from vnca.automaton.rule import Rule, Scales
 from vnca.features.flow import FlowNetwork
-from vnca.features.vgg import VGG16
+from vnca.features.network import FeatureNetwork
 from vnca.render.brightness import gamma_for_cell_opacity
 from vnca.training.config import TrainConfig
 from vnca.training.loop import Trainer
@@ -18,7 +18,7 @@ def smoke_trainer(
     smoke: Volume,
     style: FloatArray,
     config: TrainConfig,
-    vgg: VGG16,
+    network: FeatureNetwork,
     *,
     device: torch.device | str = "cpu",
     memory_budget: int | None = None,
@@ -29,7 +29,7 @@ def smoke_trainer(
         smoke: The frame.
         style: Linear RGB `[r, c, 3]`.
         config: The hyperparameters.
-        vgg: The frozen network that judges pictures.
+        network: The frozen network that judges pictures.
         device: Where to compute.
         memory_budget: Bytes that the program may take; see `Trainer`.
 
@@ -42,7 +42,7 @@ def smoke_trainer(
     motion = None
     if config.motion.weight and scene.moves:
         motion = MotionSupervision(config.motion, FlowNetwork.load(device), scene)
-    return Trainer(scene, rule, style, config, vgg, motion=motion, memory_budget=memory_budget)
+    return Trainer(scene, rule, style, config, network, motion=motion, memory_budget=memory_budget)
 
 
 def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:

@@ -95,7 +95,7 @@ class SmokeScene(Scene[SmokeSight]):
                 reach=rule.config.reach,
                 box=box,
             )
-        super().__init__(domain, priors(domain, smoke, rule), device)
+        super().__init__(domain, priors(domain, smoke, rule), device, width=view_width(self.box))
         self.samples = max(domain.box.shape) / view.step
         self.gamma = rule.scales.gamma
         density = domain.gather(smoke.density, smoke.origin) / rule.scales.density
