@@ -59,9 +59,10 @@ def _fetch(url: str, path: Path, what: str) -> None:
     try:
         response = _opened(urllib.request.Request(url, headers=headers))
     except HTTPError as error:
-        if error.code == _NOTHING_BEHIND:
-            return
-        raise
+        with error:  # It is a response, too.
+            if error.code == _NOTHING_BEHIND:
+                return
+            raise
     with response:
         goes_on = getattr(response, "status", None) == 206
         total = int(response.headers.get("Content-Length") or 0) + have * goes_on

@@ -1,7 +1,7 @@
 """What the losses ask of a frozen network that describes pictures."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import torch
 from jaxtyping import Float
@@ -13,6 +13,7 @@ SMALLEST = 32
 """Rows and columns a picture must have."""
 
 
+@runtime_checkable
 class FeatureNetwork(Protocol):
     """A frozen network whose activations say what a picture looks like.
 

@@ -8,10 +8,11 @@ ridges cover, weighed by their contrast.
 from math import exp, log, pi, sqrt
 
 import numpy as np
+import torch
 from scipy.ndimage import gaussian_filter
+from torch.nn import functional
 
 from vnca.colour import linear_to_srgb
-from vnca.io.image import resize
 from vnca.typing import AnyArray, BoolArray, FloatArray
 
 STROKE_CELLS = 3.0
@@ -23,7 +24,7 @@ FINEST, COARSEST = 3 / 128, 3 / 48
 finer strokes would be far larger than a block, one of coarser ones would have too few cells."""
 
 _SIZE = 256  # pixels along the shorter side in which ridges are sought
-_FIRST, _AN_OCTAVE, _SCALES = 0.8, 3, 17  # of the blurs, pixels
+_FIRST, _AN_OCTAVE, _SCALES = 0.63, 3, 18  # of the blurs, pixels
 _GAMMA = 0.75  # of the normalisation over scales, for ridges (Lindeberg 1998)
 _WIDTH = pi * sqrt(1 / (2 * _GAMMA))  # of a stripe, in units of the blur it stands out most in
 _BESIDE = 0.6  # pixels between a point of a ridge and its crest, at most
@@ -42,8 +43,7 @@ def stroke_width(picture: FloatArray) -> float | None:
     """
     shorter = min(picture.shape[:2])
     if shorter > _SIZE:
-        rows, columns = (round(n * _SIZE / shorter) for n in picture.shape[:2])
-        picture, shorter = resize(picture, rows, columns), _SIZE
+        picture, shorter = _reduced(picture, _SIZE / shorter), _SIZE
     values = _principal(linear_to_srgb(picture.clip(0, 1)))
     blurs = _FIRST * 2 ** (np.arange(_SCALES) / _AN_OCTAVE)
     found = [_ridges(values, blur) for blur in blurs]
@@ -73,6 +73,13 @@ def picture_cells(picture: FloatArray, cells: float, pixels: int) -> float:
         return cells
     stroke = max(STROKE_CELLS, STROKE_PIXELS * cells / pixels)
     return stroke / min(max(width, FINEST), COARSEST)
+
+
+def _reduced(picture: FloatArray, factor: float) -> FloatArray:
+    size = [round(n * factor) for n in picture.shape[:2]]
+    maps = torch.from_numpy(np.ascontiguousarray(picture, np.float32)).permute(2, 0, 1)[None]
+    reduced = functional.interpolate(maps, size, mode="bilinear", antialias=True)
+    return reduced[0].permute(1, 2, 0).numpy()
 
 
 def _principal(colours: AnyArray) -> AnyArray:

@@ -244,6 +244,7 @@ def _read_torch(path: Path, name: str | None = None) -> Weights:
             f"{conv}.{kind}": state[f"features.{index}.{kind}"].float()
             for conv, index in _torchvision_places(depth).items()
             for kind in ("weight", "bias")
+            if conv <= DEEPEST_NEEDED or f"features.{index}.{kind}" in state
         }
     except (KeyError, TypeError, AttributeError) as error:
         raise FileFormatError(

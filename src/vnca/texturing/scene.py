@@ -89,7 +89,7 @@ class BlockScene(Scene[list[Cut]]):
         """
         domain = block_domain(size)
         nothing = np.zeros((len(domain), PRIORS), np.float32)
-        super().__init__(domain, nothing, device, width=slices.size)
+        super().__init__(domain, nothing, device, width=float(slices.size))
         self.slices = slices
         self.views = mesh_views(mesh, slices.size) if mesh is not None else []
 
