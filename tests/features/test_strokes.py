@@ -27,7 +27,7 @@ def stripes(
 
 
 @settings(max_examples=12, deadline=None)
-@given(width=st.floats(3, 12), angle=st.floats(0, np.pi))
+@given(width=st.floats(4, 12), angle=st.floats(0, np.pi))
 def test_stripes_are_as_wide_as_they_are_whatever_their_direction(
     width: float, angle: float
 ) -> None:
