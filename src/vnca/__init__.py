@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from vnca.automaton.stepper import stepper
     from vnca.camera import Orthographic, Perspective, frame_box
     from vnca.errors import VncaError
-    from vnca.features.vgg import VGG16
+    from vnca.features.load import load_network
     from vnca.io.image import read_image, write_image
     from vnca.io.sequence import find_frames
     from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
@@ -50,12 +50,12 @@ _HOMES = {
     "StylizeConfig": "stylize.config",
     "TrainConfig": "training.config",
     "Trainer": "training.loop",
-    "VGG16": "features.vgg",
     "View": "render.view",
     "VncaError": "errors",
     "Volume": "volume",
     "find_frames": "io.sequence",
     "frame_box": "camera",
+    "load_network": "features.load",
     "open_vdb": "io.vdb",
     "read_image": "io.image",
     "read_smoke": "io.smoke",
@@ -73,7 +73,6 @@ _HOMES = {
 
 __all__ = [
     "PRESETS",
-    "VGG16",
     "Box",
     "FilmWriter",
     "Model",
@@ -92,6 +91,7 @@ __all__ = [
     "Volume",
     "find_frames",
     "frame_box",
+    "load_network",
     "open_vdb",
     "read_image",
     "read_smoke",

@@ -15,6 +15,7 @@ from PIL import Image
 from safetensors.numpy import load_file, save_file
 
 from vnca.automaton.model import MODEL_NAME
+from vnca.features.efficientnet import EfficientNet
 from vnca.features.vgg import VGG16
 from vnca.io.smoke import write_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
@@ -44,7 +45,8 @@ def no_long_work(monkeypatch: pytest.MonkeyPatch) -> None:
     def begin(*_: object, **__: object) -> None:
         pytest.fail("long work began before the mistake was found")
 
-    monkeypatch.setattr(VGG16, "load", begin)
+    for network in (EfficientNet, VGG16):
+        monkeypatch.setattr(network, "load", begin)
     monkeypatch.setattr(Trainer, "improve", begin)
     monkeypatch.setattr("vnca.stylize.roll.Roll.paint", begin)
     monkeypatch.setattr("vnca.cli.render.read_colour", begin)
@@ -406,6 +408,8 @@ def test_unknown_commands_and_options(vnca: Vnca, arguments: list[str]) -> None:
         ("--view.size", "8"),
         ("--pool.size", "0"),
         ("--appearance.style", "-1"),
+        ("--appearance.layers", "relu1_1"),
+        ("--appearance.style-scale", "0"),
         ("--preview-every", "0"),
         ("--device", "toaster"),
         ("--device", "meta"),

@@ -23,7 +23,7 @@ SMALL = ("--block", 16, "--steps", 6)
 TINY = (
     *("--block", 16, "--slice.size", 32, "--slice.count", 2, "--hidden", 8, "--channels", 6),
     *("--iterations", 2, "--shortest-rollout", 2, "--longest-rollout", 3, "--device", "cpu"),
-    *("--appearance.samples", 64, "--appearance.layers", "relu1_1", "relu2_1"),
+    *("--appearance.samples", 64, "--appearance.layers", "stem", "block1"),
 )
 
 

@@ -59,6 +59,8 @@ def test_needs_follow_the_options(scene: SmokeScene) -> None:
     assert memory_needs(scene, larger).pool == 2 * needs.pool
     assert memory_needs(scene, larger).pictures == 4 * needs.pictures
     assert memory_needs(scene, larger).work == needs.work
+    both = replace(MANY, appearance=replace(MANY.appearance, grey=True))
+    assert 1.5 * needs.pictures < memory_needs(scene, both).pictures < 2 * needs.pictures
 
 
 def test_what_would_save_the_most_is_advised(scene: SmokeScene) -> None:

@@ -18,7 +18,7 @@ from vnca.cli.options import say
 from vnca.cli.sequence import beside, read_alone
 from vnca.cli.session import choose_device
 from vnca.errors import OptionError
-from vnca.features.vgg import VGG16
+from vnca.features.load import load_network
 from vnca.io.image import read_style
 from vnca.io.smoke import SmokeFormat
 from vnca.kernels.update.native import default_threads
@@ -105,9 +105,9 @@ def bench_train(options: BenchTrain) -> None:
         require(name, "float32", device.type)
     torch.set_num_threads(options.threads)
     facts = run_facts(device.type, options.threads)
-    vgg = VGG16.load(config.features, device)
+    network = load_network(config.features, device)
     budget = memory_budget(options.memory_budget)
-    training = Training(_smoke(options), _style(options), config, vgg, device, budget)
+    training = Training(_smoke(options), _style(options), config, network, device, budget)
     rows = measure_training(
         training,
         options.backends or available("float32", device.type),

@@ -17,11 +17,11 @@ from vnca.cli.session import (
     choose_device,
     fitting,
     interrupted,
-    judged_by,
     run_folder,
+    shown_and_judged,
 )
 from vnca.cli.texture_block import KIND
-from vnca.features.vgg import VGG16
+from vnca.features.load import load_network
 from vnca.io.image import read_style
 from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.orientation import UpAxis
@@ -87,11 +87,11 @@ def train(options: TrainTexture, checkpoint: Checkpoint | None = None) -> Path:
     mesh = read_mesh(options.mesh, options.up_axis) if options.mesh else None
     config = options.config
     torch.use_deterministic_algorithms(True)
-    vgg = VGG16.load(config.features, device)
+    network = load_network(config.features, device)
     with fitting(config, "this block"):
         budget = memory_budget(options.memory_budget)
         trainer = texture_trainer(
-            style, config, vgg, mesh=mesh, device=device, memory_budget=budget
+            style, config, network, mesh=mesh, device=device, memory_budget=budget
         )
     training = {
         "kind": KIND,
@@ -101,7 +101,7 @@ def train(options: TrainTexture, checkpoint: Checkpoint | None = None) -> Path:
         "block": config.block,
         "seed": config.seed,
         "device": str(device),
-        **judged_by(vgg),
+        **shown_and_judged(trainer, network),
     }
     session = Session(
         command=COMMAND,
@@ -109,7 +109,7 @@ def train(options: TrainTexture, checkpoint: Checkpoint | None = None) -> Path:
         folder=folder,
         style=style,
         training=training,
-        inputs=fingerprints(style, config, vgg, mesh=_surfaces(mesh)),
+        inputs=fingerprints(style, config, network, mesh=_surfaces(mesh)),
         asked=asked(options),
         preview_every=options.preview_every,
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from typing import Literal, NamedTuple
 
 import torch
@@ -10,7 +11,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from vnca.errors import OptionError, ShapeError
-from vnca.features.vgg import STYLE_LAYERS, VGG16
+from vnca.features.network import FeatureNetwork
+from vnca.features.strokes import picture_cells
 from vnca.losses.moments import Moments, moment_distance, moments
 from vnca.losses.pixels import luminance, palette_distance
 from vnca.losses.style import sample_positions, style_distance
@@ -22,8 +24,9 @@ from vnca.typing import FloatArray
 class AppearanceConfig:
     """What is compared between a picture and the style image, and how strongly."""
 
-    layers: tuple[str, ...] = STYLE_LAYERS
-    """Layers of VGG16 to compare, `reluB_I`."""
+    layers: tuple[str, ...] = ()
+    """Layers of the network to compare: its own choice unless given. EfficientNet has stem and
+    blockN, VGG reluB_I."""
     style: float = 1.0
     """Weight of style matching; 0 leaves it out."""
     moments: float = 1.0
@@ -39,8 +42,9 @@ class AppearanceConfig:
     the paper the density, I = Σ d τ, which nothing but a change of the density can."""
     samples: int = 1024
     """Positions drawn in each layer for style matching, from either picture."""
-    style_scale: float = 1.0
-    """Shorter side of the style image relative to the view: below 1 shrinks the brush strokes."""
+    style_scale: float | None = None
+    """Shorter side of the style image relative to the view: below 1 shrinks the brush strokes.
+    Chosen so that a stroke of the picture spans three cells unless given."""
     opacity_threshold: float = 0.6
     """Compare only where the smoke is at least this opaque."""
 
@@ -52,8 +56,6 @@ class AppearanceConfig:
                 )
         if not (self.colour or self.grey):
             raise OptionError("--appearance.colour, --appearance.grey: at least one is needed")
-        if not self.layers:
-            raise OptionError("--appearance.layers: at least one is needed")
         if self.samples < 1:
             raise OptionError(f"--appearance.samples {self.samples}: must be at least 1")
         if not 0 <= self.opacity_threshold < 1:
@@ -66,7 +68,7 @@ class AppearanceConfig:
                 "--appearance.grey-source density: nothing is compared in grey; "
                 "add --appearance.grey"
             )
-        if self.style_scale <= 0:
+        if self.style_scale is not None and not 0 < self.style_scale < inf:
             raise OptionError(f"--appearance.style-scale {self.style_scale}: must be positive")
 
     @property
@@ -91,16 +93,17 @@ class _Layer(NamedTuple):
 
 
 class AppearanceLoss:
-    """Distance between pictures and one style image, over several layers of VGG16.
+    """Distance between pictures and one style image, over several layers of a network.
 
     Each layer's features are divided by the root mean square of the style image's, in colour
     and in grey. Cosines do not notice; means and covariances, which the paper compares as
-    they are, then weigh alike in all layers and for all weights of VGG16. Unscaled, they
-    differ by orders of magnitude: one set of weights takes input in ±2, another in ±128.
+    they are, then weigh alike in all layers and for all networks. Unscaled, they differ by
+    orders of magnitude: one takes input in ±2, another in ±128.
 
     Attributes:
         background: Mean colour of the style image, linear RGB `[3]`. Pictures are best
             composited over it, so that thin smoke does not read as black paint.
+        style_scale: Shorter side of the style image relative to the views, given or chosen.
 
     Reference: the VNCA paper's L_app; Kolkin, Salavon and Shakhnarovich 2019.
     """
@@ -114,27 +117,36 @@ class AppearanceLoss:
     _seed = 0
 
     def __init__(
-        self, vgg: VGG16, style_image: FloatArray, config: AppearanceConfig, size: int
+        self,
+        network: FeatureNetwork,
+        style_image: FloatArray,
+        config: AppearanceConfig,
+        size: int,
+        cells: float | None = None,
     ) -> None:
         """Prepare the style image.
 
         Args:
-            vgg: The frozen network; its device is the device of the loss.
+            network: Its device is the device of the loss.
             style_image: Linear RGB `[r, c, 3]`.
             config: What is compared.
             size: Shorter side of the views, pixels.
+            cells: The same in cells, to choose the scale of the style image by; a cell a pixel
+                unless given.
 
         Raises:
+            OptionError: If a layer does not exist.
             ShapeError: If the image is not `[r, c, 3]`.
         """
         if style_image.ndim != 3 or style_image.shape[2] != 3:
             raise ShapeError(f"style image: expected [r, c, 3], got {style_image.shape}")
         self.config = config
-        self._vgg = vgg
-        linear = torch.tensor(style_image, dtype=torch.float32, device=vgg.mean.device)
+        self._network = network
+        self.style_scale = config.style_scale or style_scale(style_image, size, cells)
+        linear = torch.tensor(style_image, dtype=torch.float32, device=network.device)
         linear = linear.permute(2, 0, 1)[None]
         self.background = linear.mean((0, 2, 3))
-        shorter = max(32, round(size * config.style_scale))
+        shorter = max(32, round(size * self.style_scale))
         self._generator = torch.Generator().manual_seed(self._seed)
         with torch.no_grad():
             picture = linear_to_srgb(_resized(linear, shorter).clamp(0, 1))
@@ -216,7 +228,7 @@ class AppearanceLoss:
         """Per layer, the maps of the picture in colour, in grey, or both."""
         grey = luminance(picture) if grey is None else grey
         kinds = [picture] * self.config.colour + [grey] * self.config.grey
-        maps = self._vgg.features(torch.cat(kinds), self.config.layers)
+        maps = self._network.features(torch.cat(kinds), self.config.layers or None)
         return [list(layer.split(len(picture))) for layer in maps]
 
     def _described(self, maps: Tensor) -> _Layer:
@@ -250,6 +262,18 @@ class AppearanceLoss:
         for features, where in zip(_positions(maps), chosen, strict=True):
             if len(where):
                 yield features[where]
+
+
+def style_scale(style_image: FloatArray, size: int, cells: float | None = None) -> float:
+    """Shorter side of a style image relative to views, for its strokes to span some cells.
+
+    Args:
+        style_image: Linear RGB `[r, c, 3]`.
+        size: Shorter side of the views, pixels.
+        cells: The same in cells; a cell a pixel unless given.
+    """
+    cells = float(size) if cells is None else cells
+    return picture_cells(style_image, cells, size) / cells
 
 
 def _positions(maps: Float[Tensor, "b c r k"]) -> Float[Tensor, "b n c"]:

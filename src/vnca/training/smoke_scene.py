@@ -99,7 +99,8 @@ class SmokeScene(Scene[SmokeSight]):
                 reach=rule.config.reach,
                 box=box,
             )
-        super().__init__(domain, priors(domain, smoke, rule), device)
+        width = view_width(self.box, smoke.index_to_world)
+        super().__init__(domain, priors(domain, smoke, rule), device, width=width)
         self._place = _stood(smoke.index_to_world)
         self.samples = max(domain.box.shape) / view.step
         self.gamma = rule.scales.gamma
