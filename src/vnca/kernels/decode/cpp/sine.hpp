@@ -42,8 +42,9 @@ INLINE void sines(float* x, float* cosines, std::size_t count) {
         const Vec v = load(x + j);
         far |= ~((v <= FURTHEST) & (v >= -FURTHEST));
     }
-    std::int32_t any = 0;
-    for (int lane = 0; lane < LANES; ++lane) any |= far[lane];
+    std::int64_t lanes[LANES / 2], any = 0;
+    std::memcpy(lanes, &far, sizeof far);
+    for (const std::int64_t two : lanes) any |= two;
     if (__builtin_expect(any != 0, false)) {
         for (std::size_t j = 0; j < count; ++j) {
             const double exact = x[j];
