@@ -10,16 +10,17 @@ import vnca
 ROOT = Path(vnca.__file__).parent
 RANKS = {
     "errors": 0, "typing": 0,
-    "volume": 1, "camera": 1, "colour": 1, "files": 1, "kernels": 1,
-    "io": 2, "automaton": 2, "render": 2, "features": 2, "simulate": 2,
-    "losses": 3, "stylize": 3,
-    "training": 4,
-    "texturing": 5, "evaluation": 5, "bench": 5, "viewer": 5,
-    "cli": 6,
+    "bricks": 1,
+    "volume": 2, "lattice": 2, "camera": 2, "colour": 2, "files": 2, "kernels": 2,
+    "io": 3, "automaton": 3, "render": 3, "features": 3, "simulate": 3,
+    "losses": 4, "stylize": 4,
+    "training": 5,
+    "texturing": 6, "evaluation": 6, "bench": 6, "viewer": 6,
+    "cli": 7,
 }  # fmt: skip
 WITHOUT_TORCH = {
-    "errors", "typing", "volume", "camera", "colour", "files", "io", "automaton",
-    "simulate", "stylize",
+    "errors", "typing", "bricks", "volume", "lattice", "camera", "colour", "files", "io",
+    "automaton", "simulate", "stylize",
 }  # fmt: skip
 KERNELS_WITH_TORCH = {
     "reference.py", "native_autograd.py", "perceivers.py", "triton.py", "triton_mask.py",

@@ -19,7 +19,7 @@ from study import REFERENCE, Findings, Study, run
 
 from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
-from vnca.cli.sequence import open_sequence, sequence_box, volumes
+from vnca.cli.sequence import open_sequence, sequence_region, volumes
 from vnca.cli.simulate import Simulate, write_simulation
 from vnca.simulate.scenes import simulate
 from vnca.stylize.roll import Painting, stylize
@@ -91,8 +91,9 @@ def on_plume(study: Generalisation) -> Generalisation:
 def painted(study: Generalisation, rule: Rule) -> Iterator[Painting]:
     """The sequence as the rule paints it."""
     sequence = open_sequence(str(study.sequence), study.frames)
-    box = sequence_box(sequence, study.smoke)
-    return stylize(volumes(sequence, study.smoke), rule, stepper(rule), PAINTED, box=box)
+    lattice, box = sequence_region(sequence, study.smoke)
+    frames = volumes(sequence, study.smoke, lattice)
+    return stylize(frames, rule, stepper(rule), PAINTED, box=box)
 
 
 def judged(judge: Judge, painting: Painting, rule: Rule) -> dict[str, float]:

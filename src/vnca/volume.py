@@ -16,7 +16,8 @@ class Volume:
         density: `[x, y, z]`, non-negative, in the units of its file.
         velocity: `[x, y, z, 3]` at cell centres, cells per frame, or None where the file has none.
         origin: Index coordinates of cell `[0, 0, 0]`; anchors the frame in its sequence.
-        index_to_world: 4×4, `world = index_to_world @ (i, j, k, 1)` for cell centres.
+        index_to_world: 4×4, `world = index_to_world @ (i, j, k, 1)` for cell centres. The world is
+            the file's, turned so that up is +z where it is another axis.
         frame: Frame number in its sequence.
     """
 

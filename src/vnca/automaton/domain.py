@@ -1,19 +1,19 @@
 """Where cells live: within reach of the smoke or in all of its box, in index space."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
+from vnca.bricks.field import Field
+from vnca.bricks.growth import dilated
+from vnca.bricks.places import EDGE, cells_at, runs_of_bricks
 from vnca.errors import OptionError
 from vnca.kernels.update.mask import HashArray, hash_cells
 from vnca.kernels.update.stencil import OFFSETS
 from vnca.typing import AnyArray, BoolArray, Box, FloatArray, Index, IntArray
-
-BRICK = 8
-"""Cells are listed brick by brick, so that neighbours in space are neighbours in memory."""
 
 MOST_CELLS = 2**27
 """A larger box (512³) may not live as a whole."""
@@ -31,7 +31,8 @@ class Domain:
     everything that does not live. Cost and memory follow the smoke, not its box.
 
     Attributes:
-        cells: `[n, 3]` index coordinates, all inside `box`, each once.
+        cells: `[n, 3]` index coordinates, all inside `box`, each once; brick by brick, so that
+            neighbours in space are neighbours in memory.
         box: Beyond its border neighbours are repeated or wrapped, even where nothing lives.
         border: What a cell at the border of the box sees beyond it.
     """
@@ -53,28 +54,19 @@ class Domain:
 
         The box is that of the array unless given.
         """
-        cells = np.argwhere(alive).astype(np.int32) + np.asarray(origin, dtype=np.int32)
-        bricks = cells // BRICK
-        order = np.lexsort((*cells.T[::-1], *bricks.T[::-1]))
-        x, y, z = (o + n for o, n in zip(origin, alive.shape, strict=True))
-        return cls(cells[order], box or Box(origin, (x, y, z)), border)
+        field = Field.from_dense(alive, origin)
+        return cls(cells_at(field.bricks, field.values), box or field.box, border)
 
     @classmethod
-    def around_smoke(
-        cls, density: FloatArray, origin: Index, *, threshold: float, reach: int, box: Box
-    ) -> "Domain":
+    def around_smoke(cls, density: Field, *, threshold: float, reach: int, box: Box) -> "Domain":
         """Cells of `box` at most `reach` cells (along each axis) from density over `threshold`.
 
         The reach lets a cell live for a while before smoke arrives in it.
         """
-        x, y, z = (o + n for o, n in zip(origin, density.shape, strict=True))
-        inside = Box(origin, (x, y, z)).grown(reach).intersection(box)
-        smoke = np.zeros(inside.shape, dtype=bool)
-        covered = Box(origin, (x, y, z)).intersection(box)
-        if not covered.is_empty:
-            part = density[covered.slices(Box(origin, (x, y, z)))]
-            smoke[covered.slices(inside)] = part > threshold
-        return cls.from_mask(dilate(smoke, reach), inside.lower, box=box)
+        smoke = replace(density, values=density.values > threshold, outside=False)
+        smoke = smoke.within(box).trimmed()
+        alive = dilated(replace(smoke, box=smoke.box.grown(reach).intersection(box)), reach)
+        return cls(cells_at(alive.bricks, alive.values), box)
 
     @classmethod
     def filling(cls, box: Box) -> "Domain":
@@ -96,28 +88,37 @@ class Domain:
         return len(self.cells)
 
     @cached_property
-    def _extent(self) -> Box:
-        """Around the cells with a margin of one: the box of a whole sequence may be far larger."""
-        if len(self) == 0:
-            return Box((0, 0, 0), (1, 1, 1))
-        x, y, z = self.cells.min(axis=0).tolist()
-        u, v, w = (self.cells.max(axis=0) + 1).tolist()
-        return Box((x, y, z), (u, v, w)).grown(1)
+    def rows(self) -> Field:
+        """The row of each cell in the state, n where nothing lives."""
+        rows = np.arange(len(self), dtype=np.int32)
+        return Field.from_cells(self.cells, rows, self.box, outside=np.int32(len(self)))
 
     @cached_property
     def neighbours(self) -> IntArray:
         """`[27, n]` rows of the state around each cell, n where nothing lives."""
-        box = self.box
-        if self.border == "replicate" and len(self):
-            box = self._extent.intersection(self.box)
-        lower = np.asarray(box.lower)
-        row_of = np.full(box.shape, len(self), dtype=np.int32)
-        row_of[tuple((self.cells - lower).T)] = np.arange(len(self), dtype=np.int32)
-        mode = "edge" if self.border == "replicate" else "wrap"
-        row_of = np.pad(row_of, 1, mode=mode)
-        strides = np.array([row_of.shape[1] * row_of.shape[2], row_of.shape[2], 1])
-        flat = (self.cells - lower + 1) @ strides
-        return row_of.ravel()[(OFFSETS @ strides)[:, None] + flat]
+        result = np.empty((len(OFFSETS), len(self)), np.int32)
+        if len(self) == 0:
+            return result
+        around = self.rows.haloed()
+        strides = np.array([s // around.itemsize for s in around.strides])
+        runs, lengths = runs_of_bricks(self.cells)
+        at = np.repeat(self.rows.places.find(runs) * strides[0], lengths)
+        for axis in range(3):
+            at += ((self.cells[:, axis] & (EDGE - 1)) + 1) * strides[1 + axis]
+        for row, offset in zip(result, OFFSETS, strict=True):
+            np.take(around.reshape(-1), at + offset @ strides[1:], out=row, mode="clip")
+        lower, upper = np.asarray(self.box.lower), np.asarray(self.box.upper)
+        border = np.flatnonzero(((self.cells == lower) | (self.cells == upper - 1)).any(axis=1))
+        cells = self.cells[border]
+        beside = cells + OFFSETS[:, None]
+        if self.border == "replicate":
+            # What is repeated is a neighbour, too.
+            steps = np.clip(beside, lower, upper - 1) - cells
+            result[:, border] = around.reshape(-1)[at[border] + steps @ strides[1:]]
+        else:
+            wrapped = ((beside - lower) % (upper - lower) + lower).reshape(-1, 3)
+            result[:, border] = self.rows.gather(wrapped).reshape(len(OFFSETS), -1)
+        return result
 
     @cached_property
     def places(self) -> AnyArray:
@@ -152,23 +153,5 @@ class Domain:
 
     def carry(self, state: AnyArray, other: "Domain") -> AnyArray:
         """The state on `other`: cells alive in both keep theirs, new ones start from zero."""
-        box = self._extent.union(other._extent)
-        lower, shape = np.asarray(box.lower), box.shape
-        row_of = np.full(int(np.prod(shape)), len(self), dtype=np.int32)
-        row_of[np.ravel_multi_index(tuple((self.cells - lower).T), shape)] = np.arange(len(self))
-        rows = row_of[np.ravel_multi_index(tuple((other.cells - lower).T), shape)]
-        return state[np.append(rows, len(self))]
-
-
-def dilate(mask: BoolArray, reach: int) -> BoolArray:
-    """Cells at most `reach` cells along each axis from one in `mask`; axes do not wrap."""
-    for axis in range(mask.ndim):
-        grown = mask.copy()
-        for shift in range(1, min(reach, mask.shape[axis] - 1) + 1):
-            ahead = [slice(None)] * mask.ndim
-            behind = [slice(None)] * mask.ndim
-            ahead[axis], behind[axis] = slice(shift, None), slice(None, -shift)
-            grown[tuple(ahead)] |= mask[tuple(behind)]
-            grown[tuple(behind)] |= mask[tuple(ahead)]
-        mask = grown
-    return mask
+        rows = self.rows.gather(other.cells)
+        return state[np.append(rows, np.int32(len(self)))]

@@ -15,7 +15,8 @@ import vnca
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import ModelError, OptionError, ShapeError
 from vnca.files import existing_file, whole_file
-from vnca.typing import FloatArray
+from vnca.lattice import Lattice, Region
+from vnca.typing import Box, FloatArray
 
 FORMAT_VERSION = 1
 MODEL_NAME = "model.safetensors"
@@ -24,6 +25,7 @@ MODEL_NAME = "model.safetensors"
 _METADATA = "vnca"
 _WEIGHTS = ("hidden", "bias", "output")
 _STYLE = "style"
+_FARTHEST = 1e30  # in the world, or of a cell's size
 _EXACT = 2**53  # whole numbers up to here are floats
 
 T = TypeVar("T")
@@ -65,6 +67,7 @@ class Model:
                     "version": self.version,
                     "rule": dataclasses.asdict(self.rule.config),
                     "scales": dataclasses.asdict(self.rule.scales),
+                    **_described(self.rule.place),
                     "training": self.training,
                 }
             )
@@ -104,6 +107,7 @@ class Model:
                 **{name: _single_precision(name, tensors[name]) for name in _WEIGHTS},
                 config=from_record(RuleConfig, described["rule"]),
                 scales=from_record(Scales, described["scales"]),
+                place=_place(described.get("place")),
             )
             training, version = dict(described["training"]), str(described["version"])
         except (KeyError, TypeError, ValueError, RecursionError, OptionError) as error:
@@ -114,6 +118,32 @@ class Model:
         if style is not None and (style.dtype != np.uint8 or style.shape[2:] != (3,)):
             raise ModelError(f"{path}: the style thumbnail is not an 8-bit picture")
         return cls(rule, training, style, version)
+
+
+def _described(place: Region | None) -> dict[str, Any]:
+    if place is None:
+        return {}
+    return {"place": {"lattice_to_world": place.lattice.to_world.tolist(), "box": place.box}}
+
+
+def _place(record: Any) -> Region | None:
+    """Where a rule was trained; models that do not tell were written before they did.
+
+    Raises:
+        ValueError: If it is nowhere.
+    """
+    if record is None:
+        return None
+    to_world, box = np.array(record["lattice_to_world"], float), np.array(record["box"])
+    is_affine = to_world.shape == (4, 4) and np.array_equal(to_world[3], (0, 0, 0, 1))
+    # Not-a-numbers are not smaller either.
+    is_sound = is_affine and (np.abs(to_world) < _FARTHEST).all()
+    if not is_sound or not np.linalg.slogdet(to_world)[0]:
+        raise ValueError(f"place: lattice_to_world {record['lattice_to_world']!r}")
+    if box.shape != (2, 3) or box.dtype.kind != "i" or not (box[0] < box[1]).all():
+        raise ValueError(f"place: box {record['box']!r}")
+    (x, y, z), (u, v, w) = box.tolist()
+    return Region(Lattice(to_world), Box((x, y, z), (u, v, w)))
 
 
 def from_record(kind: type[T], record: Any) -> T:

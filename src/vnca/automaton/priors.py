@@ -7,11 +7,12 @@ import numpy as np
 
 from vnca.automaton.domain import Domain
 from vnca.automaton.rule import PRIORS, Rule
+from vnca.lattice import Placement
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 
-DENSITY, VELOCITY = slice(3, 4), slice(4, 7)
-"""Which priors of a cell are the density and the velocity."""
+POSITION, DENSITY, VELOCITY = slice(0, 3), slice(3, 4), slice(4, 7)
+"""Which priors of a cell are which."""
 SPEED_LIMIT = 2.0
 """Cells are told no normalised speed above this: training has hardly met faster smoke, and what a
 rule has not met it paints badly. Nor must a file in other units blow a state up."""
@@ -24,21 +25,31 @@ _SQUARABLE = 1e18
 def priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
     """Position, density and velocity `[n, 7]` at the cells of a domain.
 
-    The position of a cell is (2i + 1)/H − 1 in the domain's box, −1 to 1. Priors that the rule
-    switches off, and velocity where the smoke has none, are zero.
+    The position of a cell is (2i + 1)/H − 1, −1 to 1, in the box where the rule was trained; what
+    lies outside is told to lie at its border. Of a rule that does not know where that was, it is
+    the domain's box. Priors that the rule switches off, and velocity where the smoke has none, are
+    zero.
     """
     config, scales = rule.config, rule.scales
     values = np.zeros((len(domain), PRIORS), dtype=np.float32)
     if config.position_prior:
-        shape = np.asarray(domain.box.shape)
-        at = domain.cells - np.asarray(domain.box.lower)
-        values[:, 0:3] = (2 * at + 1) / shape - 1
+        values[:, POSITION] = _positions(domain, smoke, rule)
     if config.density_prior:
         density = domain.gather(smoke.density, smoke.origin)
         values[:, DENSITY] = np.minimum(density / scales.density, DENSITY_LIMIT)[:, None]
     if smoke.velocity is not None:
         values[:, VELOCITY] = told_velocity(domain.gather(smoke.velocity, smoke.origin), rule)
     return values
+
+
+def _positions(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
+    box, cells = domain.box, domain.cells
+    if rule.place is not None:
+        there = rule.place.lattice.to_world
+        place = Placement.between(smoke.index_to_world, there, domain.box, f"frame {smoke.frame}")
+        box, cells = rule.place.box, place.cells(cells)
+    at = (2 * (cells - np.asarray(box.lower)) + 1) / np.asarray(box.shape) - 1
+    return np.clip(at, -1, 1).astype(np.float32)
 
 
 def told_velocity(velocity: FloatArray, rule: Rule) -> FloatArray:

@@ -8,6 +8,7 @@ import numpy as np
 from vnca.automaton.domain import DomainKind
 from vnca.errors import OptionError, ShapeError
 from vnca.kernels.update.stencil import FILTERS
+from vnca.lattice import Region
 from vnca.typing import FloatArray
 
 PRIORS = 7
@@ -44,7 +45,7 @@ class RuleConfig:
     laplacian_divisor: float = 26.0
     """Divisor of the 27-point Laplacian."""
     position_prior: bool = True
-    """Tell cells where in the sequence's box they are."""
+    """Tell cells where in the box of the training they are."""
     density_prior: bool = True
     """Tell cells the density of the smoke."""
     velocity_prior: bool = True
@@ -97,6 +98,8 @@ class Rule:
         output: W2 `[C, hidden]`.
         config: Its shape.
         scales: Its normalisers.
+        place: Where it was trained, in which cells have a position. Without it, that is the box of
+            the domain.
     """
 
     hidden: FloatArray
@@ -104,6 +107,7 @@ class Rule:
     output: FloatArray
     config: RuleConfig = field(default_factory=RuleConfig)
     scales: Scales = field(default_factory=Scales)
+    place: Region | None = None
 
     def __post_init__(self) -> None:
         expected = {

@@ -17,10 +17,12 @@ from vnca.bench.agreement import Difference, require_agreement
 from vnca.bench.memory import peak_mb
 from vnca.bench.timing import Spread, in_turns
 from vnca.errors import BackendUnavailableError
+from vnca.io.orientation import on_one_lattice
 from vnca.io.sequence import FrameSequence, find_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.kernels.update.backend import choose
 from vnca.kernels.update.native import Precision
+from vnca.lattice import Lattice
 from vnca.simulate.scenes import simulate
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.painter import Painter
@@ -44,7 +46,7 @@ class PaintedSequence:
         rule: The rule.
         sequence: The files.
         smoke: How they are read.
-        volumes: The same frames, read.
+        volumes: The same frames, read, on one lattice.
         config: How the rule is rolled over them.
     """
 
@@ -63,9 +65,15 @@ class PaintedSequence:
         Raises:
             VncaError: If a frame cannot be read.
         """
-        volumes = [read_smoke(f.path, smoke, frame=f.number) for f in sequence]
+        frames = (read_smoke(f.path, smoke, frame=f.number) for f in sequence)
+        volumes = list(on_one_lattice(frames))
         config = StylizeConfig(steps_per_frame=steps, warmup=0)
         return cls(rule, sequence, smoke, volumes, config)
+
+    @property
+    def lattice(self) -> Lattice:
+        """That of the frames."""
+        return Lattice(self.volumes[-1].index_to_world)
 
     def roll(self, backend: str, threads: int, precision: Precision) -> Roll:
         """The rule in a backend, ready for the sequence."""
@@ -197,6 +205,7 @@ def _painter(painted: PaintedSequence, roll: Roll, folder: Path) -> Painter:
         painted.sequence,
         folder,
         roll,
+        painted.lattice,
         painted.smoke,
         colour_grids=("Cd",),
         on_error="stop",

@@ -15,12 +15,12 @@ from vnca.bench.train import Training, measure_training
 from vnca.cli.bench_options import Rows, Tables, parse_bench, short
 from vnca.cli.demo import STYLE
 from vnca.cli.options import say
-from vnca.cli.sequence import beside
+from vnca.cli.sequence import beside, read_alone
 from vnca.cli.session import choose_device
 from vnca.errors import OptionError
 from vnca.features.vgg import VGG16
 from vnca.io.image import read_image
-from vnca.io.smoke import SmokeFormat, read_smoke
+from vnca.io.smoke import SmokeFormat
 from vnca.kernels.update.native import default_threads
 from vnca.simulate.scenes import simulate
 from vnca.training.config import PRESETS, TrainConfig
@@ -121,7 +121,7 @@ def bench_train(options: BenchTrain) -> None:
 
 def _smoke(options: BenchTrain) -> Volume:
     if options.frame is not None:
-        return read_smoke(options.frame, beside(options.frame, options.smoke))
+        return read_alone(options.frame, beside(options.frame, options.smoke))
     say("simulating a plume")
     *_, frame = simulate("plume", resolution=options.resolution, frames=_FRAME, seed=0)
     return frame

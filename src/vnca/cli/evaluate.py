@@ -17,7 +17,7 @@ from vnca.bench.machine import run_facts
 from vnca.cli.options import is_given, parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.recorded import PICTURE_CELLS, recorded_smoke
-from vnca.cli.sequence import open_sequence, sequence_box, volumes
+from vnca.cli.sequence import open_sequence, placed, sequence_region, volumes
 from vnca.errors import OptionError
 from vnca.evaluation.measures import Measure, measures
 from vnca.evaluation.report import report
@@ -107,22 +107,24 @@ def evaluate(options: Evaluate, model: Model) -> None:
     sequence = open_sequence(_sequence(options, folder), options.frames)
     width = _compared_width(options, model)
     smoke = with_fitted_scale(options.smoke, sequence)
-    box = sequence_box(sequence, smoke)
+    lattice, box = region = sequence_region(sequence, smoke)
+    rule = placed(model.rule, region)
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.
-    shapes = volumes(sequence, dataclasses.replace(smoke, velocity_grid=NO_VELOCITY))
+    still = dataclasses.replace(smoke, velocity_grid=NO_VELOCITY)
+    shapes = volumes(sequence, still, lattice)
     refine = options.refine
-    stage = Stage.around(shapes, model.rule, options.size).refined(refine)
+    stage = Stage.around(shapes, rule, options.size).refined(refine)
     gauge = StyleGauge(picture, _checked_size(width(stage), f"--size {options.size}"))
     paintings = stylize(
-        volumes(sequence, smoke),
-        model.rule,
-        stepper(model.rule, options.backend),
+        volumes(sequence, smoke, lattice),
+        rule,
+        stepper(rule, options.backend),
         options.config,
         box=box,
         refine=refine,
     )
     tracking = tracked(paintings, "painting and measuring", len(sequence), "frames")
-    found = survey(tracking, len(sequence), model.rule.refined(refine), stage, gauge)
+    found = survey(tracking, len(sequence), rule.refined(refine), stage, gauge)
     facts = {
         "title": f"{folder.resolve().name} on {sequence[0].path.resolve().parent.name}",
         "picture": str(model.training.get("style", options.style)),

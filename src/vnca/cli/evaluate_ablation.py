@@ -13,7 +13,7 @@ import tyro
 from vnca.automaton.model import MODEL_NAME, Model
 from vnca.automaton.rule import Rule
 from vnca.cli.options import chosen, parse, say
-from vnca.cli.sequence import beside
+from vnca.cli.sequence import beside, read_alone
 from vnca.cli.train import Train, train
 from vnca.errors import OptionError
 from vnca.evaluation.estimators import Estimator, estimators
@@ -24,7 +24,7 @@ from vnca.evaluation.motion import (
     measure_motion,
 )
 from vnca.files import existing_file, whole_file, writable_file
-from vnca.io.smoke import SmokeFormat, read_smoke
+from vnca.io.smoke import SmokeFormat
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.volume import Volume
 
@@ -186,7 +186,7 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def _read(frame: Path, smoke: SmokeFormat) -> Volume:
-    return read_smoke(existing_file(frame), beside(frame, smoke))
+    return read_alone(existing_file(frame), beside(frame, smoke))
 
 
 def _write(path: Path, measures: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ import tyro
 from vnca.cli.film import Film, FilmConfig, parse_colour, picture
 from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
-from vnca.cli.sequence import open_sequence, sequence_box, volumes
+from vnca.cli.sequence import open_sequence, sequence_region, volumes
 from vnca.errors import OptionError
 from vnca.files import writable_file
 from vnca.io.image import SUFFIXES as PICTURES
@@ -25,6 +25,7 @@ from vnca.io.sheet import contact_sheet
 from vnca.io.smoke import SmokeFormat
 from vnca.io.smoke_format import NO_VELOCITY
 from vnca.io.video import SUFFIXES as FILMS
+from vnca.lattice import Lattice
 from vnca.render.brightness import gamma_for_cell_opacity
 from vnca.typing import Box, FloatArray
 from vnca.volume import Volume
@@ -107,12 +108,14 @@ def render_sequence(options: Render) -> None:
             f"--out {options.out}: {len(sequence)} frames need a film (mp4, gif, webp), "
             "a name such as frame_####.png, or --frames"
         )
-    box = sequence_box(sequence, options.smoke)
-    shown = tracked(_frames(sequence, options), "rendering", len(sequence), "frames")
+    region = sequence_region(sequence, options.smoke)
+    shown = tracked(
+        _frames(sequence, options, region.lattice), "rendering", len(sequence), "frames"
+    )
     if options.is_film:
-        _film(shown, len(sequence), box, options)
+        _film(shown, len(sequence), region.box, options)
     else:
-        _pictures(shown, box, options)
+        _pictures(shown, region.box, options)
     say(f"rendered: {options.out}")
 
 
@@ -120,8 +123,8 @@ def strip(sequence: FrameSequence, options: Render, count: int) -> list[FloatArr
     """Pictures, linear RGB `[rows, columns, 3]`, of `count` frames evenly spaced in a sequence."""
     picked = sorted({round(at) for at in np.linspace(0, len(sequence) - 1, count)})
     some = FrameSequence(tuple(sequence[at] for at in picked))
-    box = sequence_box(sequence, options.smoke)
-    return [_picture(frame, box, options) for frame in _frames(some, options)]
+    lattice, box = sequence_region(sequence, options.smoke)
+    return [_picture(frame, box, options) for frame in _frames(some, options, lattice)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +136,14 @@ class _Shown:
     gamma: float
 
 
-def _frames(sequence: FrameSequence, options: Render) -> Iterator[_Shown]:
+def _frames(sequence: FrameSequence, options: Render, lattice: Lattice) -> Iterator[_Shown]:
     gamma = options.gamma
     # Nothing here needs velocity, and beside a refined painting it has coarser cells.
     seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
-    for frame, smoke in zip(sequence, volumes(sequence, seen), strict=True):
-        colour = read_colour(frame.path, options.smoke, grid=options.colour_grid, box=smoke.box)
+    for frame, smoke in zip(sequence, volumes(sequence, seen, lattice), strict=True):
+        colour = read_colour(
+            frame.path, options.smoke, grid=options.colour_grid, box=smoke.box, lattice=lattice
+        )
         if gamma is None and smoke.density.size:
             opacity = CELL_OPACITY["unpainted" if colour is None else "painted"]
             gamma = gamma_for_cell_opacity(smoke.density, opacity)

@@ -1,17 +1,25 @@
 """A sequence of smoke as the subcommands see it: frames, gaps told, box, volumes read ahead."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 
+import numpy as np
+
+from vnca.automaton.rule import Rule
 from vnca.cli.options import say
-from vnca.errors import SequenceError, VncaError
+from vnca.errors import SequenceError
 from vnca.files import existing_file
+from vnca.io.orientation import on_lattice
 from vnca.io.sequence import FrameSequence, find_frames, format_frames
-from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, with_fitted_scale
+from vnca.io.smoke import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
+from vnca.io.smoke_format import Extent
+from vnca.lattice import Lattice, Placement, Region, require_room
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.painter import BROKEN
-from vnca.typing import Box
+from vnca.typing import AnyArray, Box
 from vnca.volume import Volume
 
 
@@ -25,6 +33,21 @@ def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
     if sequence.gaps:
         say(f"{pattern}: no file for frames {format_frames(sequence.gaps)}; going on without")
     return sequence
+
+
+def read_alone(path: Path, smoke: SmokeFormat) -> Volume:
+    """A frame on a lattice of its own; if its voxels are not those cells, that is told.
+
+    Raises:
+        VncaError: If it cannot be read, or can have no place on a lattice.
+    """
+    volume = read_smoke(path, smoke)
+    what = f"{path}: grid {smoke.density_grid!r}"
+    lattice = Lattice.of(volume.index_to_world, what)
+    place = Placement.between(volume.index_to_world, lattice.to_world, volume.box, what)
+    if not place.is_whole:
+        _tell_resampled(path, volume.index_to_world, lattice, others=0)
+    return on_lattice(volume, lattice, what)
 
 
 def beside(path: Path, smoke: SmokeFormat) -> SmokeFormat:
@@ -45,10 +68,13 @@ def beside(path: Path, smoke: SmokeFormat) -> SmokeFormat:
     return with_fitted_scale(smoke, frames[max(0, places[0] - 1) : places[0] + 2])
 
 
-def sequence_box(
+def sequence_region(
     sequence: FrameSequence, smoke: SmokeFormat, *, without_broken: bool = False
-) -> Box:
-    """The box that holds the smoke of all frames, from the files' headers where they tell.
+) -> Region:
+    """The lattice of a sequence, and the box in it that holds the smoke of all frames.
+
+    The lattice is that of the first frame with smoke. That others are interpolated to its cells is
+    told. Files' headers are read, where they tell.
 
     Args:
         sequence: The frames.
@@ -58,33 +84,78 @@ def sequence_box(
     Raises:
         SequenceError: If no frame has smoke.
         FileFormatError: If a frame cannot be read.
-        GridError: If one has no smoke to read.
+        GridError: If one has no smoke to read, or can have no place on the lattice.
     """
-    box, broken = Box((0, 0, 0), (0, 0, 0)), 0
+    lattice, box, broken = None, Box((0, 0, 0), (0, 0, 0)), 0
+    resampled: list[tuple[Path, AnyArray]] = []
     for frame in sequence:
-        found = _box_or_error(frame.path, smoke)
-        if isinstance(found, Box):
-            box = box.union(found)
+        try:
+            extent = smoke_extent(frame.path, smoke)
+            if extent.box.is_empty:
+                continue
+            what = f"{frame.path}: grid {smoke.density_grid!r}"
+            lattice = lattice or Lattice.of(extent.index_to_world, what)
+            covered, is_whole = _covered(extent, lattice, what)
+        except BROKEN:
+            broken += 1
+            if broken == len(sequence) or not without_broken:
+                raise
             continue
-        broken += 1
-        if broken == len(sequence) or not without_broken:
-            raise found
-    if box.is_empty:
+        box = box.union(covered)
+        if not is_whole:
+            resampled.append((frame.path, extent.index_to_world))
+    if lattice is None:
         raise SequenceError(
             f"{sequence[0].path.parent}: there is no smoke in any frame; "
             "choose others with --frames or another grid with --density-grid"
         )
-    return box
+    if resampled:
+        _tell_resampled(*resampled[0], lattice, others=len(resampled) - 1)
+    return Region(lattice, box)
 
 
-def _box_or_error(path: Path, smoke: SmokeFormat) -> Box | VncaError:
-    try:
-        return smoke_box(path, smoke)
-    except BROKEN as error:
-        return error
+def _covered(extent: Extent, lattice: Lattice, what: str) -> tuple[Box, bool]:
+    """The cells of a lattice that a frame has a part in, and whether its cells are those."""
+    place = Placement.between(extent.index_to_world, lattice.to_world, extent.box, what)
+    box = place.box(extent.box)
+    if not place.is_whole:
+        require_room(box, what)
+    return box, place.is_whole
 
 
-def volumes(sequence: FrameSequence, smoke: SmokeFormat) -> Iterator[Volume]:
-    """The frames in order, the next one read while one is used."""
-    loads = (partial(read_smoke, f.path, smoke, frame=f.number) for f in sequence)
+def _tell_resampled(path: Path, index_to_world: AnyArray, lattice: Lattice, *, others: int) -> None:
+    sides = " × ".join(f"{side:g}" for side in np.linalg.norm(index_to_world[:3, :3], axis=0))
+    also = f", as is that of {others} more" * (others > 0)
+    say(
+        f"{path}: its voxels, {sides}, are not the cells of the sequence's lattice, cubes of "
+        f"{lattice.spacing:g}; its smoke is resampled to those{also}"
+    )
+
+
+def placed(rule: Rule, region: Region) -> Rule:
+    """A rule as it is for a region: apart from where it was trained, that has positions of its own.
+
+    A rule that tells cells their position would else tell all of them the same; it is told.
+    """
+    if rule.place is None or not rule.config.position_prior:
+        return rule
+    there = rule.place.lattice.to_world
+    place = Placement.between(region.lattice.to_world, there, region.box, "the sequence")
+    ends = np.array(list(product(*zip(*region.box, strict=True)))) - 0.5
+    lower, upper = (np.array(end) - 0.5 for end in rule.place.box)
+    corners = place.cells(ends)
+    if (corners.max(axis=0) > lower).all() and (corners.min(axis=0) < upper).all():
+        return rule
+    say(
+        "the smoke lies apart from where the rule was trained, which tells cells their position: "
+        "they are told that in the box of this sequence"
+    )
+    return replace(rule, place=None)
+
+
+def volumes(
+    sequence: FrameSequence, smoke: SmokeFormat, lattice: Lattice | None = None
+) -> Iterator[Volume]:
+    """The frames in order, as `read_smoke` gives them; the next is read while one is used."""
+    loads = (partial(read_smoke, f.path, smoke, frame=f.number, lattice=lattice) for f in sequence)
     return read_ahead(loads)

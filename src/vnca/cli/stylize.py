@@ -20,7 +20,7 @@ from vnca.cli.film import Film, FilmConfig
 from vnca.cli.options import parse, say
 from vnca.cli.progress import Progress
 from vnca.cli.recorded import recorded_smoke
-from vnca.cli.sequence import open_sequence, sequence_box
+from vnca.cli.sequence import open_sequence, placed, sequence_region
 from vnca.cli.termination import finishing
 from vnca.errors import BackendUnavailableError, OptionError
 from vnca.files import remove_leftovers, writable_file, writable_folder
@@ -30,11 +30,12 @@ from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.io.video import SUFFIXES as FILMS
 from vnca.kernels.update.backend import choose
 from vnca.kernels.update.native import Precision
+from vnca.lattice import Lattice
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.painter import OnError, Painter
 from vnca.stylize.roll import Roll
 from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.volume import Volume, refined_transform
 
 
 @dataclass(frozen=True)
@@ -130,18 +131,20 @@ def paint(options: Stylize, model: Model | None = None) -> None:
     if any(f.path.resolve().parent == options.out.resolve() for f in sequence):
         raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
     smoke = with_fitted_scale(options.smoke, sequence)
-    box = sequence_box(sequence, smoke, without_broken=options.on_error != "stop")
+    region = sequence_region(sequence, smoke, without_broken=options.on_error != "stop")
+    rule = placed(rule, region)
     backend = choose(options.backend)
     roll = Roll(
         rule,
         stepper(rule, backend, precision=options.precision),
         options.config,
-        box,
+        region.box,
     ).refined(options.refine)
     painter = Painter(
         sequence,
         options.out,
         roll,
+        region.lattice,
         smoke,
         options.colour_grid,
         options.on_error,
@@ -150,7 +153,8 @@ def paint(options: Stylize, model: Model | None = None) -> None:
             "--refine": options.refine,
             "the model": _digest(rule),
             "the list of frames": [frame.path.name for frame in sequence],
-            "the box of the smoke": box,
+            "the box of the smoke": region.box,
+            "the place of its cells in the world": region.lattice.to_world.tolist(),
             "--backend": backend,
             "--precision": options.precision,
             "--density-scale": scales.density,
@@ -175,7 +179,9 @@ def paint(options: Stylize, model: Model | None = None) -> None:
 def _digest(rule: Rule) -> str:
     """Equal for rules that paint equally."""
     shape = dataclasses.asdict(rule.config)
-    digest = hashlib.blake2b(json.dumps([shape, rule.scales.velocity]).encode(), digest_size=16)
+    place = rule.place and [rule.place.lattice.to_world.tolist(), rule.place.box]
+    described = json.dumps([shape, rule.scales.velocity, place])
+    digest = hashlib.blake2b(described.encode(), digest_size=16)
     for weights in (rule.hidden, rule.bias, rule.output):
         digest.update(weights.tobytes())
     return digest.hexdigest()
@@ -202,7 +208,7 @@ def _paint(painter: Painter, options: Stylize) -> bool:
                 for finished, (frame, path) in enumerate(zip(sequence, paths, strict=True), 1):
                     if film is not None and path is not None:
                         # As the file has it, so that a film is the same with and without --resume.
-                        smoke, colour = _read_painted(path, frame.path, options)
+                        smoke, colour = _read_painted(path, frame.path, options, painter.lattice)
                         gamma = scales.gamma / scales.density
                         film.add(smoke.density, colour, smoke.origin, gamma=gamma)
                     progress.show(finished)
@@ -228,11 +234,14 @@ def _film(options: Stylize, painter: Painter, stack: ExitStack) -> Film | None:
         return None
 
 
-def _read_painted(path: Path, source: Path, options: Stylize) -> tuple[Volume, FloatArray]:
-    """Smoke and colour of a painted frame."""
+def _read_painted(
+    path: Path, source: Path, options: Stylize, lattice: Lattice
+) -> tuple[Volume, FloatArray]:
+    """Smoke and colour of a painted frame, on the lattice that was painted on."""
     up = up_axis_of(source, options.smoke)
     format = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY, up_axis=up)
-    smoke = read_smoke(path, format)
-    colour = read_colour(path, format, grid=options.colour_grid[0], box=smoke.box)
+    lattice = Lattice(refined_transform(lattice.to_world, options.refine))
+    smoke = read_smoke(path, format, lattice=lattice)
+    colour = read_colour(path, format, grid=options.colour_grid[0], box=smoke.box, lattice=lattice)
     assert colour is not None, "it was written a moment ago"
     return smoke, colour

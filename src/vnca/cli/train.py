@@ -14,7 +14,7 @@ from vnca.automaton.rule import Rule, RuleConfig
 from vnca.cli import texture_train
 from vnca.cli.options import chosen, is_given, parse, say
 from vnca.cli.recorded import PICTURE_CELLS
-from vnca.cli.sequence import beside
+from vnca.cli.sequence import beside, read_alone
 from vnca.cli.session import (
     ResumeOptions,
     Session,
@@ -30,7 +30,7 @@ from vnca.errors import GridError, OptionError
 from vnca.features.vgg import VGG16
 from vnca.files import remove_file
 from vnca.io.image import read_image
-from vnca.io.smoke import SmokeFormat, read_smoke
+from vnca.io.smoke import SmokeFormat
 from vnca.texturing.beginning import SHAPE, SHARES, beginning_config, deaf_to_priors
 from vnca.texturing.config import TextureConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
@@ -109,7 +109,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
     style = read_image(options.style)
     device = choose_device(options.device)
     smoke_format = beside(options.frame, options.smoke)
-    smoke = read_smoke(options.frame, smoke_format)
+    smoke = read_alone(options.frame, smoke_format)
     if not smoke.density.any():
         raise GridError(
             f"{options.frame}: there is no smoke in this frame to train on; choose a later one"

@@ -11,6 +11,7 @@ from vnca.automaton.stepper import stepper
 from vnca.errors import GridError
 from vnca.evaluation.stage import SIZE, Coloured, Pair, Sight, Stage
 from vnca.evaluation.style import StyleDistances, StyleGauge, gap_closed, mean_distances
+from vnca.io.orientation import on_one_lattice
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.roll import stylize
 from vnca.typing import Box, FloatArray
@@ -141,6 +142,7 @@ def measure_style(
     Raises:
         GridError: If there is no smoke, or none that is opaque.
     """
+    frames = list(on_one_lattice(frames))
     box = reduce(Box.union, (smoke.box for smoke in frames), Box((0, 0, 0), (0, 0, 0)))
     stage = Stage.around(frames, rule, size).refined(refine)
     gauge = StyleGauge(picture, round(cells * stage.scale))

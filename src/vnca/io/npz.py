@@ -23,6 +23,7 @@ from vnca.errors import FileFormatError, GridError
 from vnca.files import existing_file
 from vnca.io.smoke_format import (
     NO_VELOCITY,
+    Extent,
     SmokeFormat,
     StoredSmoke,
     StoredVelocity,
@@ -60,13 +61,13 @@ def read_npz_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
     return StoredSmoke(density, box.lower, np.eye(4), velocity)
 
 
-def npz_smoke_box(path: Path, format: SmokeFormat) -> Box:
-    """The box of the cells with density other than zero.
+def npz_smoke_extent(path: Path, format: SmokeFormat) -> Extent:
+    """The box of the cells with density other than zero, of one unit of the world each.
 
     Raises:
         FileFormatError: If the file is missing, truncated, or holds something else.
     """
-    return occupied_box(read_npz_density(path))
+    return Extent(occupied_box(read_npz_density(path)), np.eye(4))
 
 
 def read_npz_density(path: Path) -> FloatArray:

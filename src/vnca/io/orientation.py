@@ -1,59 +1,81 @@
-"""Between the axes of a file and ours, where up is +z.
+"""From the axes and the world of a file to ours, where up is +z, and onto a lattice.
 
-For a file with y up, ours is (x, y, z) = its (z, x, y): a rotation, without flips. Only index
-axes move; the world stays the file's, so `index_to_world` gives the same world coordinates.
+A file's world with y up is turned: ours is (x, y, z) = its (z, x, y), a rotation without flips. Its
+cells keep their places in it, but are counted along our axes: in a file whose index axes are
+exchanged or mirrored, too, cells go to the right, back and up. Writers go the same way back.
 """
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Literal, TypeAlias
 
-import numpy as np
-
-from vnca.typing import AnyArray, Box, Index
+from vnca.lattice import Lattice, Placement, require_room, upright_turn
+from vnca.typing import AnyArray
+from vnca.volume import Volume
 
 UpAxis: TypeAlias = Literal["z", "y"]
 
-# For each of our axes, the file's; and the reverse.
-_TO_INTERNAL: dict[UpAxis, Index] = {"z": (0, 1, 2), "y": (2, 0, 1)}
-_TO_FILE: dict[UpAxis, Index] = {"z": (0, 1, 2), "y": (1, 2, 0)}
+# For each axis of our world, the file's.
+_WORLD_AXES: dict[UpAxis, list[int]] = {"z": [0, 1, 2, 3], "y": [2, 0, 1, 3]}
 
 
-def to_internal(array: AnyArray, up: UpAxis, *, vectors: bool = False) -> AnyArray:
-    """A file's `[x, y, z, ...]` with our axes; with `vectors`, the last axis turns as well."""
-    return _turned(array, _TO_INTERNAL[up], vectors)
+def upright_world(index_to_world: AnyArray, up: UpAxis) -> AnyArray:
+    """4×4, from a file's cells to the world, where `up` points up there and +z does here."""
+    return index_to_world[_WORLD_AXES[up]]
 
 
-def to_file(array: AnyArray, up: UpAxis, *, vectors: bool = False) -> AnyArray:
-    """The inverse of `to_internal`."""
-    return _turned(array, _TO_FILE[up], vectors)
+def own_cells(index_to_world: AnyArray, what: str) -> tuple[Placement, AnyArray]:
+    """How a grid's own cells are counted along our axes, and their 4×4 `index_to_world`.
+
+    Args:
+        index_to_world: 4×4, from the grid's cells to our world.
+        what: What a message calls it.
+    """
+    turn = upright_turn(index_to_world)
+    return Placement(turn.T, True, what), index_to_world @ turn
 
 
-def box_to_internal(box: Box, up: UpAxis) -> Box:
-    """A box of the file's cells with our axes."""
-    return Box(*(index_to_internal(corner, up) for corner in box))
+def on_lattice(smoke: Volume, lattice: Lattice, what: str) -> Volume:
+    """A frame on the cells of a lattice, to which its own are moved or its smoke interpolated.
+
+    Velocity is in cells per frame of the lattice then. Smoke fades over a cell into what its box
+    leaves out, as in OpenVDB; velocity goes on as at the border.
+
+    Args:
+        smoke: The frame.
+        lattice: The lattice.
+        what: What a message calls the frame.
+
+    Raises:
+        GridError: If its axes are not at right angles, or it takes too many cells.
+    """
+    if smoke.box.is_empty:
+        return replace(smoke, origin=(0, 0, 0), index_to_world=lattice.to_world)
+    place = Placement.between(smoke.index_to_world, lattice.to_world, smoke.box, what)
+    over = place.box(smoke.box)
+    if not place.is_whole:
+        require_room(over, what)
+    velocity = smoke.velocity
+    if velocity is not None:
+        velocity = place.vectors(place.array(velocity, smoke.box, over, "nearest"))
+    return Volume(
+        place.array(smoke.density, smoke.box, over),
+        velocity,
+        over.lower,
+        lattice.to_world,
+        smoke.frame,
+    )
 
 
-def box_to_file(box: Box, up: UpAxis) -> Box:
-    """The inverse of `box_to_internal`."""
-    return Box(*(_picked(corner, _TO_FILE[up]) for corner in box))
+def on_one_lattice(frames: Iterable[Volume]) -> Iterator[Volume]:
+    """Frames on the lattice of the first that has smoke, whose cells must be cubic.
 
-
-def index_to_internal(index: Index, up: UpAxis) -> Index:
-    """Coordinates of a cell of the file with our axes."""
-    return _picked(index, _TO_INTERNAL[up])
-
-
-def matrix_to_internal(index_to_world: AnyArray, up: UpAxis) -> AnyArray:
-    """A file's 4×4 `index_to_world` for our indices; the same world."""
-    return index_to_world[:, [*_TO_INTERNAL[up], 3]]
-
-
-def _turned(array: AnyArray, order: Index, vectors: bool) -> AnyArray:
-    if order == (0, 1, 2):
-        return np.ascontiguousarray(array)
-    array = array.transpose(*order, *range(3, array.ndim))
-    return np.ascontiguousarray(array[..., order] if vectors else array)
-
-
-def _picked(index: Index, order: Index) -> Index:
-    x, y, z = (index[axis] for axis in order)
-    return x, y, z
+    Raises:
+        GridError: If they are not, or a frame can have no place on them.
+    """
+    lattice = None
+    for smoke in frames:
+        what = f"frame {smoke.frame}"
+        if lattice is None and not smoke.box.is_empty:
+            lattice = Lattice.as_it_is(smoke.index_to_world, what)
+        yield smoke if lattice is None else on_lattice(smoke, lattice, what)

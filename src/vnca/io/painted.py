@@ -1,19 +1,20 @@
 """Writing smoke as VDB files: painted frames of a sequence, and simulated ones."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from vnca.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.io.npz import read_npz_smoke
-from vnca.io.orientation import box_to_file, to_file, to_internal
+from vnca.io.orientation import UpAxis, on_lattice, own_cells, upright_world
 from vnca.io.smoke_format import CELLS_PER_FRAME, UNITS_METADATA, SmokeFormat, up_axis_of
 from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
-from vnca.typing import BoolArray, Box, FloatArray
+from vnca.lattice import Lattice, Placement
+from vnca.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.volume import Volume, refined_transform
 
 COLOUR_GRIDS = ("Cd",)
@@ -28,6 +29,7 @@ def write_painted(
     density: FloatArray,
     colour: FloatArray,
     box: Box,
+    lattice: Lattice | None = None,
     colour_grids: Sequence[str] = COLOUR_GRIDS,
     refine: int = 1,
 ) -> None:
@@ -37,7 +39,8 @@ def write_painted(
     every other grid of a VDB source is copied unchanged, except those the colours replace. The
     file has the source's axes: of an npz source, +y up, a voxel size of 1, and its velocity.
     Refined, density and colour get the transform of the finer cells, and those with density are
-    active.
+    active. Where the cells painted are not the source's, colour is interpolated to those, and what
+    was interpolated of the density is the factor between painted and not.
 
     Args:
         path: The VDB file to write.
@@ -45,7 +48,9 @@ def write_painted(
         format: How the frame was read.
         density: `[x, y, z]` over `box`, in the units of the source.
         colour: `[x, y, z, 3]` over `box`, linear RGB.
-        box: Cells covered by the arrays, in our axes: at least those of the source's density.
+        box: Cells covered by the arrays: at least those of the source's density.
+        lattice: Whose cells these are, if `refine` is 1; those that `read_smoke` gives without one
+            unless given.
         colour_grids: Names of the colour grids, several to have the colour several times.
         refine: How many times as fine as the source's the painted cells are along each axis.
 
@@ -64,8 +69,7 @@ def write_painted(
     if len(set(names)) < len(names):
         raise OptionError(f"colour_grids: expected names of their own, got {', '.join(names)}")
     _require_vdb(path)
-    up = up_axis_of(source, format)
-    frame = _Painting(to_file(density, up), to_file(colour, up), box_to_file(box, up), refine)
+    frame = _Painting(density, colour, box, lattice, up_axis_of(source, format), refine)
     write = _paint_npz if source.suffix.lower() == ".npz" else _paint_vdb
     write(path, source, format, frame, colour_grids)
 
@@ -106,53 +110,98 @@ def write_smoke(path: Path, volume: Volume) -> None:
     write_vdb(path, grids)
 
 
-def read_colour(path: Path, format: SmokeFormat, *, grid: str, box: Box) -> FloatArray | None:
-    """Linear RGB `[x, y, z, 3]` over `box`, in our axes, of a painted frame.
+def read_colour(
+    path: Path, format: SmokeFormat, *, grid: str, box: Box, lattice: Lattice | None = None
+) -> FloatArray | None:
+    """Linear RGB `[x, y, z, 3]` over `box` of a painted frame, counted as by `read_smoke`.
 
     None where the file has no grid of that name; black where the grid has no value.
 
     Raises:
         FileFormatError: If the file cannot be read.
-        GridError: If the grid does not hold vectors of three.
+        GridError: If the grid does not hold vectors of three, or can have no place on the lattice.
     """
     if path.suffix.lower() != ".vdb":
         return None
-    up = up_axis_of(path, format)
     with open_vdb(path) as file:
         if grid not in file.grids:
             return None
         header = file.grids[grid]
+        what = f"{path}: grid '{grid}'"
         if not header.value_type.startswith("vec3"):
-            raise GridError(
-                f"{path}: grid '{grid}' holds {header.value_type}, not a colour; see --colour-grid"
-            )
-        values, _ = header.read().to_dense(box_to_file(box, up), fill=0)
-    return to_internal(values.astype(np.float32), up)
+            raise GridError(f"{what} holds {header.value_type}, not a colour; see --colour-grid")
+        stored = header.read()
+        own = upright_world(header.transform.index_to_world, up_axis_of(path, format))
+        ours = own_cells(own, what)[1] if lattice is None else lattice.to_world
+        cells = stored.active_box()
+        place = Placement.between(own, ours, cells, what)
+        if place.is_whole:
+            cells = place.inverse.box(box)
+        values, active = stored.to_dense(cells, fill=0)
+    values = place.array(values.astype(np.float32), cells, box)
+    if not place.is_whole:
+        # Between a colour and nothing lies that colour.
+        share = place.array(active.astype(np.float32), cells, box)[..., None]
+        np.divide(values, share, out=values, where=share > 0)
+    return values
 
 
-class _Painting(NamedTuple):
-    """Painted arrays in the axes of a file."""
+@dataclass(frozen=True, eq=False)
+class _Painting:
+    """Painted arrays, and where their cells lie.
+
+    Attributes:
+        density: `[x, y, z]` over `box`.
+        colour: `[x, y, z, 3]` over `box`.
+        box: Their cells, `refine` times as fine as those of the lattice.
+        lattice: None for those of the source, along our axes.
+        up: Which axis of the source's world points up.
+        refine: How fine they are.
+    """
 
     density: FloatArray
     colour: FloatArray
     box: Box
+    lattice: Lattice | None
+    up: UpAxis
     refine: int
 
-    def over(self, cells: Box, source: Path) -> "_Painting":
-        """The part of it that covers `cells` of the file.
+    def in_file(
+        self, transform: Transform, density: AnyArray, cells: Box, what: str
+    ) -> tuple[FloatArray, FloatArray, Box]:
+        """Density and colour of the file's cells, or as fine ones, and which these are.
+
+        Args:
+            transform: Of the file's cells.
+            density: Theirs before they were painted, as the file has it.
+            cells: Which they are.
+            what: What a message calls them.
 
         Raises:
             ShapeError: If some of them were not painted.
         """
-        cells = cells.refined(self.refine)
-        if self.box.union(cells) != self.box:
-            raise ShapeError(f"{source}: smoke in {cells}, but only {self.box} was painted")
-        inside = cells.slices(self.box)
-        return _Painting(self.density[inside], self.colour[inside], cells, self.refine)
+        world = upright_world(transform.index_to_world, self.up)
+        ours = own_cells(world, what)[1]
+        if self.lattice is not None and not cells.is_empty:
+            ours = self.lattice.to_world
+        needed = Placement.between(world, ours, cells, what).box(cells).refined(self.refine)
+        if self.box.union(needed) != self.box:
+            raise ShapeError(f"{what}: smoke in {needed}, but only {self.box} was painted")
+        over = cells.refined(self.refine)
+        source, target = (refined_transform(matrix, self.refine) for matrix in (world, ours))
+        back = Placement.between(source, target, over, what).inverse
+        colour = back.array(self.colour, self.box, over, "nearest")
+        if back.is_whole:
+            return back.array(self.density, self.box, over), colour, over
+        positive = np.maximum(density.astype(np.float32), 0)
+        plain = Volume(positive, None, cells.lower, world, 0)
+        factor = self._factor(on_lattice(plain, Lattice(ours), what).refined(self.refine))
+        factor = back.array(factor, self.box, over, "nearest")
+        return plain.refined(self.refine).density * factor, colour, over
 
-    def active(self, of_file: BoolArray) -> BoolArray:
+    def active(self, density: FloatArray, of_file: BoolArray) -> BoolArray:
         """Which cells to store; `of_file` are active in the file."""
-        return of_file if self.refine == 1 else self.density != 0
+        return of_file if self.refine == 1 else density != 0
 
     def transform(self, of_file: Transform) -> Transform:
         """That of the painted cells; `of_file` is that of the file's."""
@@ -160,16 +209,26 @@ class _Painting(NamedTuple):
             return of_file
         return Transform.from_matrix(refined_transform(of_file.index_to_world, self.refine))
 
+    def _factor(self, plain: Volume) -> FloatArray:
+        """Over `box`, what the painting multiplied the density by; 1 where there was none."""
+        factor = np.ones_like(self.density)
+        inside = plain.box.slices(self.box)
+        before = plain.density
+        np.divide(self.density[inside], before, out=factor[inside], where=before > 0)
+        return factor
+
 
 def _paint_vdb(
     path: Path, source: Path, format: SmokeFormat, frame: _Painting, colour_grids: Sequence[str]
 ) -> None:
     with open_vdb(source) as file:
         header, old, cells = read_density(file, format)
-        frame = frame.over(cells, source)
-        active = frame.active(old.to_dense(cells)[1])
-        transform, origin = frame.transform(old.transform), frame.box.lower
-        density, colour = frame.density, frame.colour
+        what = f"{source}: grid {header.name!r}"
+        before, active = old.to_dense(cells, fill=0)
+        density, colour, box = frame.in_file(old.transform, before, cells, what)
+        del before
+        active = frame.active(density, active)
+        transform, origin = frame.transform(old.transform), box.lower
         dtype = VALUE_TYPES[old.value_type].dtype
         if dtype.kind != "f":
             dtype = np.dtype(np.float32)
@@ -194,22 +253,21 @@ def _paint_npz(
     path: Path, source: Path, format: SmokeFormat, frame: _Painting, colour_grids: Sequence[str]
 ) -> None:
     stored = read_npz_smoke(source, format)
-    origin, transform = stored.origin, Transform.from_matrix(stored.index_to_world)
-    x, y, z = (start + cells for start, cells in zip(origin, stored.density.shape, strict=True))
-    frame = frame.over(Box(origin, (x, y, z)), source)
-    active = frame.active(stored.density != 0)
+    transform = Transform.from_matrix(stored.index_to_world)
+    density, colour, box = frame.in_file(transform, stored.density, stored.box, str(source))
+    active = frame.active(density, stored.density != 0)
     grids = [
         Grid.from_dense(
             name,
             values,
             active,
-            frame.box.lower,
+            box.lower,
             transform=frame.transform(transform),
             grid_class="fog volume",
         )
         for name, values in [
-            (format.density_grid, frame.density),
-            *((name, frame.colour) for name in colour_grids),
+            (format.density_grid, density),
+            *((name, colour) for name in colour_grids),
         ]
     ]
     if (velocity := stored.velocity) is not None:
@@ -218,7 +276,7 @@ def _paint_npz(
                 "velocity",
                 velocity.values,
                 velocity.stored,
-                origin,
+                stored.origin,
                 transform=transform,
                 grid_class="staggered" if all(velocity.staggered) else None,
             )

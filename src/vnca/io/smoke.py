@@ -13,18 +13,14 @@ import numpy as np
 
 from vnca.errors import FileFormatError, GridError, OptionError, SequenceError
 from vnca.files import existing_file
-from vnca.io.npz import npz_smoke_box, read_npz_smoke
-from vnca.io.orientation import (
-    box_to_internal,
-    index_to_internal,
-    matrix_to_internal,
-    to_internal,
-)
+from vnca.io.npz import npz_smoke_extent, read_npz_smoke
+from vnca.io.orientation import on_lattice, own_cells, upright_world
 from vnca.io.painted import write_painted, write_smoke
 from vnca.io.sequence import Frame
-from vnca.io.smoke_format import SmokeFormat, StoredSmoke, StoredVelocity, up_axis_of
-from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_box
+from vnca.io.smoke_format import Extent, SmokeFormat, StoredSmoke, StoredVelocity, up_axis_of
+from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_extent
 from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
+from vnca.lattice import Lattice, Placement
 from vnca.typing import AnyArray, Box, FloatArray
 from vnca.volume import Volume
 
@@ -52,20 +48,22 @@ class Reader:
 
     Attributes:
         read: Reads a frame in the axes of its file.
-        box: The cells that hold smoke, in the axes of the file.
+        extent: The cells that hold smoke, in the axes of the file.
     """
 
     read: Callable[[Path, SmokeFormat], StoredSmoke]
-    box: Callable[[Path, SmokeFormat], Box]
+    extent: Callable[[Path, SmokeFormat], Extent]
 
 
 READERS = {
-    ".vdb": Reader(read_vdb_smoke, vdb_smoke_box),
-    ".npz": Reader(read_npz_smoke, npz_smoke_box),
+    ".vdb": Reader(read_vdb_smoke, vdb_smoke_extent),
+    ".npz": Reader(read_npz_smoke, npz_smoke_extent),
 }
 
 
-def read_smoke(path: Path, format: SmokeFormat, *, frame: int = 0) -> Volume:
+def read_smoke(
+    path: Path, format: SmokeFormat, *, frame: int = 0, lattice: Lattice | None = None
+) -> Volume:
     """A frame over the box of its smoke, up along +z, velocity in cells per frame.
 
     Velocity is continued a few cells beyond where it is stored, and zero farther away. Density a
@@ -75,32 +73,53 @@ def read_smoke(path: Path, format: SmokeFormat, *, frame: int = 0) -> Volume:
         path: A `.vdb` file, or a `.npz` file in Mantaflow's layout.
         format: How to read it; a scale to be fitted must have been, see `with_fitted_scale`.
         frame: The frame's number.
+        lattice: That of its sequence, on whose cells it is wanted. Otherwise it has its own cells,
+            counted along the world's axes, which need not be cubic.
 
     Raises:
         FileFormatError: If the file cannot be read.
-        GridError: If grids are missing, do not fit together, or hold values that are no smoke.
+        GridError: If grids are missing, do not fit together, or hold values that are no smoke; or
+            if they can have no place on the lattice.
         OptionError: If an option has no meaning.
     """
     stored = _reader(path).read(path, format)
-    up = up_axis_of(path, format)
+    density = _non_negative(stored.density, path)
     velocity = None if stored.velocity is None else _velocity(stored.velocity, stored, format)
-    return Volume(
-        density=to_internal(_non_negative(stored.density, path), up),
-        velocity=None if velocity is None else to_internal(velocity, up, vectors=True),
-        origin=index_to_internal(stored.origin, up),
-        index_to_world=matrix_to_internal(stored.index_to_world, up),
-        frame=frame,
-    )
+    place, index_to_world = _upright(stored.index_to_world, path, format)
+    box = place.box(stored.box)
+    if velocity is not None:
+        velocity = place.vectors(place.array(velocity, stored.box, box))
+    density = place.array(density, stored.box, box)
+    smoke = Volume(density, velocity, box.lower, index_to_world, frame)
+    return smoke if lattice is None else on_lattice(smoke, lattice, place.what)
 
 
-def smoke_box(path: Path, format: SmokeFormat) -> Box:
-    """The box `read_smoke` would fill; quick where the file's headers tell.
+def smoke_extent(path: Path, format: SmokeFormat) -> Extent:
+    """The box that `read_smoke` fills without a lattice, and where it lies in the world.
+
+    Quick where the file's headers tell.
 
     Raises:
         FileFormatError: If the file cannot be read.
         GridError: If there is no density grid.
     """
-    return box_to_internal(_reader(path).box(path, format), up_axis_of(path, format))
+    extent = _reader(path).extent(path, format)
+    place, index_to_world = _upright(extent.index_to_world, path, format)
+    return Extent(place.box(extent.box), index_to_world)
+
+
+def smoke_box(path: Path, format: SmokeFormat, *, lattice: Lattice | None = None) -> Box:
+    """The box that `read_smoke` would fill; quick where the file's headers tell.
+
+    Raises:
+        FileFormatError: If the file cannot be read.
+        GridError: If there is no density grid, or it can have no place on the lattice.
+    """
+    box, index_to_world = smoke_extent(path, format)
+    if lattice is None or box.is_empty:
+        return box
+    place = Placement.between(index_to_world, lattice.to_world, box, _named(path, format))
+    return place.box(box)
 
 
 def with_fitted_scale(format: SmokeFormat, frames: Sequence[Frame]) -> SmokeFormat:
@@ -122,13 +141,32 @@ def with_fitted_scale(format: SmokeFormat, frames: Sequence[Frame]) -> SmokeForm
     scales, failure = [], None
     for chosen in np.unique(np.linspace(0, len(pairs) - 1, _FITTED_PAIRS).round().astype(int)):
         try:
-            volumes = [read_smoke(path, unscaled, frame=number) for number, path in pairs[chosen]]
-            scales.append(fit_velocity_scale(*volumes))
+            scales.append(fit_velocity_scale(*_alike(pairs[chosen], unscaled)))
         except (GridError, FileFormatError) as error:  # noqa: PERF203
             failure = error
     if failure is not None and not scales:
         raise failure
     return replace(format, velocity_scale=median(scales))
+
+
+def _alike(pair: tuple[Frame, Frame], format: SmokeFormat) -> tuple[Volume, Volume]:
+    """Two frames on the lattice of the first."""
+    first, second = (read_smoke(path, format, frame=number) for number, path in pair)
+    named = [_named(path, format) for _, path in pair]
+    lattice = Lattice.of(first.index_to_world, named[0])
+    return on_lattice(first, lattice, named[0]), on_lattice(second, lattice, named[1])
+
+
+def _upright(
+    index_to_world: AnyArray, path: Path, format: SmokeFormat
+) -> tuple[Placement, AnyArray]:
+    """How the cells of a file are counted along our axes, and where they lie in our world."""
+    up = up_axis_of(path, format)
+    return own_cells(upright_world(index_to_world, up), _named(path, format))
+
+
+def _named(path: Path, format: SmokeFormat) -> str:
+    return f"{path}: grid {format.density_grid!r}"
 
 
 def _reader(path: Path) -> Reader:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -68,6 +68,13 @@ class StoredVelocity:
     in_cells_per_frame: bool = False
 
 
+class Extent(NamedTuple):
+    """Where smoke lies: the box of its cells, and their 4×4 `index_to_world`."""
+
+    box: Box
+    index_to_world: AnyArray
+
+
 @dataclass(frozen=True, eq=False)
 class StoredSmoke:
     """Smoke as a file has it, in the file's axes, over the box of its density.
@@ -83,6 +90,12 @@ class StoredSmoke:
     origin: Index
     index_to_world: AnyArray
     velocity: StoredVelocity | None
+
+    @property
+    def box(self) -> Box:
+        """The cells of the density."""
+        x, y, z = (o + n for o, n in zip(self.origin, self.density.shape, strict=True))
+        return Box(self.origin, (x, y, z))
 
 
 def up_axis_of(path: Path, format: SmokeFormat) -> UpAxis:

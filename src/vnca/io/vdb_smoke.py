@@ -11,6 +11,7 @@ from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
     NO_VELOCITY,
     UNITS_METADATA,
+    Extent,
     SmokeFormat,
     StoredSmoke,
     StoredVelocity,
@@ -48,8 +49,8 @@ def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
         )
 
 
-def vdb_smoke_box(path: Path, format: SmokeFormat) -> Box:
-    """The box of the density's active cells, from the header where it has one.
+def vdb_smoke_extent(path: Path, format: SmokeFormat) -> Extent:
+    """Where the density's active cells lie, from the header where it tells.
 
     Raises:
         FileFormatError: If the file cannot be read.
@@ -57,7 +58,8 @@ def vdb_smoke_box(path: Path, format: SmokeFormat) -> Box:
     """
     with open_vdb(path) as file:
         header = density_header(file, format)
-        return header.read().active_box() if header.box is None else header.box
+        box = header.read().active_box() if header.box is None else header.box
+        return Extent(box, header.transform.index_to_world)
 
 
 def density_header(file: VdbFile, format: SmokeFormat) -> GridHeader:

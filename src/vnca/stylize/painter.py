@@ -12,6 +12,7 @@ from vnca.errors import FileFormatError, GridError, OptionError, OutputError, Sh
 from vnca.files import existing_file, remove_file, remove_leftovers
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke import SmokeFormat, read_smoke, write_painted
+from vnca.lattice import Lattice
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.roll import Roll, RollState
 from vnca.stylize.unfinished import Source, Unfinished
@@ -43,6 +44,7 @@ class Painter:
         sequence: What to paint.
         out: Folder for the painted frames.
         roll: The rule, ready for the sequence.
+        lattice: Whose cells all frames are painted on.
         smoke: How smoke is read.
         colour_grids: Names for the colour.
         on_error: With a broken frame: stop; leave it out; or paint the one before it again.
@@ -56,6 +58,7 @@ class Painter:
     sequence: FrameSequence
     out: Path
     roll: Roll
+    lattice: Lattice
     smoke: SmokeFormat
     colour_grids: Sequence[str]
     on_error: OnError
@@ -160,6 +163,7 @@ class Painter:
             density=painting.density,
             colour=painting.colour,
             box=read.smoke.box,
+            lattice=self.lattice,
             colour_grids=self.colour_grids,
             refine=self.refine,
         )
@@ -170,7 +174,9 @@ class Painter:
         frame = self.sequence[at]
         try:
             status = existing_file(frame.path).stat()
-            smoke = read_smoke(frame.path, self.smoke, frame=frame.number).refined(self.refine)
+            smoke = read_smoke(
+                frame.path, self.smoke, frame=frame.number, lattice=self.lattice
+            ).refined(self.refine)
         except BROKEN as error:
             return error
         except OSError as error:

@@ -1,6 +1,6 @@
 """Rolling a rule over a sequence: state in, painting out, a frame at a time.
 
-The state is anchored in index space and carried from frame to frame, while the cells that live
+The state is anchored in a lattice and carried from frame to frame, while the cells that live
 follow the smoke. Nothing but the state of the last frame is kept, so memory does not grow with
 the length of a sequence.
 
@@ -18,6 +18,8 @@ from vnca.automaton.paint import colours, density_factors
 from vnca.automaton.priors import priors
 from vnca.automaton.rule import SMOKE_THRESHOLD, Rule
 from vnca.automaton.stepper import Step
+from vnca.bricks.field import Field
+from vnca.io.orientation import on_one_lattice
 from vnca.io.velocity import extrapolated
 from vnca.kernels.update.mask import changing_rows
 from vnca.stylize.config import StylizeConfig
@@ -36,8 +38,8 @@ class RollState:
     """What a frame leaves to the next: all it takes to go on from there.
 
     Attributes:
-        cells: `[n, 3]` index coordinates of the cells alive; none before the first frame and after
-            one without smoke.
+        cells: `[n, 3]` index coordinates, in the lattice, of the cells alive; none before the
+            first frame and after one without smoke.
         values: `[n + 1, C]`, their state and a last row of zeros.
         steps_done: Steps since the sequence began, by which the next ones are numbered.
     """
@@ -79,8 +81,8 @@ class Roll:
         rule: The trained rule.
         step: The kernel that applies it.
         config: How.
-        box: Holds the smoke of all frames; gives cells their position. Known from the files'
-            headers before the first frame is read.
+        box: Holds the smoke of all frames, in cells of the lattice that they share. Known from the
+            files' headers before the first frame is read.
         fringe: How many cells beyond the living ones their colour goes on.
     """
 
@@ -115,7 +117,7 @@ class Roll:
         return RollState.empty(self.rule.config.channels)
 
     def paint(self, smoke: Volume, state: RollState) -> Painting:
-        """The next frame, from the state that the one before it left.
+        """The next frame, of the same lattice, from the state that the one before it left.
 
         A frame without smoke passes through. The painting starts afresh after it, unless cells
         live in the whole box.
@@ -162,8 +164,7 @@ class Roll:
         if self.domain_kind == "box":
             return self._whole_box
         return Domain.around_smoke(
-            smoke.density,
-            smoke.origin,
+            Field.from_dense(smoke.density, smoke.origin),
             threshold=SMOKE_THRESHOLD * self.rule.scales.density,
             reach=self.rule.config.reach,
             box=self.box.grown(self.rule.config.reach),
@@ -185,12 +186,17 @@ def stylize(
 ) -> Iterator[Painting]:
     """Paint a sequence frame by frame, reading one at a time.
 
+    All are painted on the lattice of the first that has smoke, in whose cells the box is.
+
     See `Roll` for the other arguments; `refine` times as fine as the smoke's is the grid of the
     paintings.
+
+    Raises:
+        GridError: If its cells are not cubic, or a frame can have no place on them.
     """
     roll = Roll(rule, step, config, box).refined(refine)
     state = roll.start()
-    for smoke in frames:
+    for smoke in on_one_lattice(frames):
         painting = roll.paint(smoke.refined(refine), state)
         state = painting.state
         yield painting

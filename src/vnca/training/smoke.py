@@ -1,10 +1,14 @@
 """Training on smoke: the trainer of a frame and a picture."""
 
+from dataclasses import replace
+
 import torch
 
 from vnca.automaton.rule import Rule, Scales
 from vnca.features.flow import FlowNetwork
 from vnca.features.vgg import VGG16
+from vnca.io.orientation import on_lattice
+from vnca.lattice import Lattice, Region
 from vnca.render.brightness import gamma_for_cell_opacity
 from vnca.training.config import TrainConfig
 from vnca.training.loop import Trainer
@@ -26,7 +30,7 @@ def smoke_trainer(
     """What trains a rule on one frame and one picture.
 
     Args:
-        smoke: The frame.
+        smoke: The frame, which is laid on a lattice of its own.
         style: Linear RGB `[r, c, 3]`.
         config: The hyperparameters.
         vgg: The frozen network that judges pictures.
@@ -34,11 +38,14 @@ def smoke_trainer(
         memory_budget: Bytes that the program may take; see `Trainer`.
 
     Raises:
-        GridError: If there is no smoke in the frame.
+        GridError: If there is no smoke in the frame, or it can have no place on a lattice.
         OptionError: If the memory budget is not enough.
     """
+    what = f"frame {smoke.frame}"
+    smoke = on_lattice(smoke, Lattice.of(smoke.index_to_world, what), what)
     rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
     scene = SmokeScene(smoke, rule, config.view, winds=config.winds, device=device)
+    rule = replace(rule, place=Region(Lattice(smoke.index_to_world), scene.domain.box))
     motion = None
     if config.motion.weight and scene.moves:
         motion = MotionSupervision(config.motion, FlowNetwork.load(device), scene)

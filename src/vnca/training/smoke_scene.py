@@ -13,6 +13,7 @@ from torch import Tensor
 from vnca.automaton.domain import Domain
 from vnca.automaton.priors import DENSITY, VELOCITY, priors, told_velocity
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
+from vnca.bricks.field import Field
 from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable
 from vnca.errors import GridError
 from vnca.render.colour import linear_to_srgb, srgb_to_linear
@@ -89,8 +90,7 @@ class SmokeScene(Scene[SmokeSight]):
             domain = Domain.filling(box)
         else:
             domain = Domain.around_smoke(
-                smoke.density,
-                smoke.origin,
+                Field.from_dense(smoke.density, smoke.origin),
                 threshold=SMOKE_THRESHOLD * rule.scales.density,
                 reach=rule.config.reach,
                 box=box,
