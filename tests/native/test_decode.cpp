@@ -36,7 +36,7 @@ struct Case {
 };
 
 constexpr Case CASES[] = {
-    {"one point", 1, 1, 4, 1},
+    {"one point", 1, 1, 4, 7},
     {"odd", 301, 77, 5, 17},
     {"several ranges", 4100, 2100, 12, 32},
     {"no point", 0, 10, 12, 32},

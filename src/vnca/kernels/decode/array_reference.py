@@ -16,20 +16,29 @@ SLAB = 4096
 
 
 def decode(
-    state: FloatArray, rows: IntArray, fractions: FloatArray, weights: Weights
+    state: FloatArray, rows: IntArray, fractions: FloatArray, weights: Weights | None
 ) -> FloatArray:
-    """What is seen `[m, 4]` at points; arguments are those of `native.decode`."""
+    """What is seen `[m, 4]` at points; arguments are those of `native.decode`.
+
+    Without weights that is the interpolated state.
+    """
+    if weights is None:
+        state = state[:, :OUTPUTS]
     result = np.empty((len(fractions), OUTPUTS), dtype=state.dtype)
     for start in range(0, len(fractions), SLAB):
         slab = slice(start, start + SLAB)
-        result[slab] = _network(interpolate(state, rows[:, slab], fractions[slab]), weights)
+        between = interpolate(state, rows[:, slab], fractions[slab])
+        result[slab] = between if weights is None else _network(between, weights)
     return result
 
 
 def decode_cells(
-    state: FloatArray, cells: IntArray, neighbours: IntArray, factor: int, weights: Weights
+    state: FloatArray, cells: IntArray, neighbours: IntArray, factor: int, weights: Weights | None
 ) -> FloatArray:
-    """What is seen `[m, factor, factor, factor, 4]`; arguments are those of `native.decode_cells`."""
+    """What is seen `[m, factor, factor, factor, 4]`; arguments are those of `native.decode_cells`.
+
+    Without weights that is the interpolated state.
+    """
     result = np.empty((len(cells), *3 * (factor,), OUTPUTS), dtype=state.dtype)
     at_once = max(1, SLAB // factor**3)
     for start in range(0, len(cells), at_once):

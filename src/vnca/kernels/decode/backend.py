@@ -41,12 +41,12 @@ class ArrayDecode(NamedTuple):
     """Decoding of arrays.
 
     Attributes:
-        at: What is seen at points, called as `vnca.kernels.decode.native.decode` is.
-        in_cells: What is seen in the parts of cells, called as `native.decode_cells` is.
+        decode: What is seen at points, called as `vnca.kernels.decode.native.decode` is.
+        decode_cells: What is seen in the parts of cells, called as `native.decode_cells` is.
     """
 
-    at: Callable[..., FloatArray]
-    in_cells: Callable[..., FloatArray]
+    decode: Callable[..., FloatArray]
+    decode_cells: Callable[..., FloatArray]
 
 
 def array_decode(backend: str = "auto", *, threads: int | None = None) -> ArrayDecode:

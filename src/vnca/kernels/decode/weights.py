@@ -3,14 +3,14 @@
 from typing import Any, NamedTuple
 
 OUTPUTS = 4
-"""What is seen: colour (3) as sRGB − ½, and Δd, added to the channels of the state that hold them."""
+"""What is seen: colour (3) as sRGB − ½, and Δd; added to the first channels of the state."""
 
 CORNERS = 8
 """Cells around a point, z fastest."""
 
 
 class Weights(NamedTuple):
-    """Of three sine layers and a linear one; arrays, tensors, or what else there is one of for each.
+    """Of three sine layers and a linear one; arrays, tensors, or whatever there is for each.
 
     The frequency by which a sine layer is customarily multiplied is part of its weights and bias.
 
