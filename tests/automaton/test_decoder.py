@@ -22,21 +22,25 @@ def test_a_decoder_before_training_is_drawn_from_its_seed() -> None:
 
 
 def test_a_higher_frequency_draws_finer_contours() -> None:
-    def turns(frequency: float) -> int:
-        """How often what is seen turns, on the way from one state to another."""
-        decoder = Decoder.initial(12, seed=0, frequency=frequency)
-        rule = Rule.initial(RuleConfig(hidden=1), Scales(), seed=0)
-        state = np.zeros((3, 12), np.float32)
-        state[:2] = np.random.default_rng(0).uniform(-0.5, 0.5, (2, 12))
-        rows = np.array([[0]] * 4 + [[1]] * 4, np.int32).repeat(1000, axis=1)
-        fractions = np.zeros((1000, 3), np.float32)
-        fractions[:, 0] = np.linspace(0, 1, 1000)
-        seen = Between(replace(rule, decoder=decoder)).at(state, rows, fractions)
-        plain = Between(rule).at(state, rows, fractions)
-        slope = np.diff(seen[:, 0] - plain[:, 0])
-        return int((slope[1:] * slope[:-1] < 0).sum())
+    rule = Rule.initial(RuleConfig(hidden=1), Scales(), seed=0)
+    state = np.zeros((3, 12), np.float32)
+    state[:2] = np.random.default_rng(0).uniform(-0.5, 0.5, (2, 12))
+    rows = np.array([[0]] * 4 + [[1]] * 4, np.int32).repeat(500, axis=1)
+    fractions = np.zeros((500, 3), np.float32)
+    fractions[:, 0] = np.linspace(0, 1, 500)
+    plain = Between(rule).at(state, rows, fractions)
 
-    assert turns(40) > 2 * turns(20) > 2 * turns(10) > 0
+    def turns(frequency: float) -> int:
+        """How often what decoders add turns, on the way from one cell to the next."""
+        total = 0
+        for seed in range(8):
+            decoder = Decoder.initial(12, seed=seed, frequency=frequency)
+            added = Between(replace(rule, decoder=decoder)).at(state, rows, fractions) - plain
+            slope = np.diff(added.astype(np.float64), axis=0)
+            total += int((slope[1:] * slope[:-1] < 0).sum())
+        return total
+
+    assert turns(40) > 2 * turns(10) > 0
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_without_a_decoder_states_are_interpolated() -> None:
     every = np.arange(len(cells), dtype=np.int32)
     in_cells = between.in_cells(state, every, cells.neighbours, 1)
     np.testing.assert_array_equal(in_cells[:, 0, 0, 0], state[:-1, :4])
-    halfway = between.at(state, *cells.corners(cells.cells + (0.0, 0.0, 0.5)))
+    halfway = between.at(state, *cells.corners(cells.cells + np.array([0, 0, 0.5])))
     beside = np.append(state, state[-1:], axis=0)[cells.neighbours[14]]
     np.testing.assert_allclose(halfway, (state[:-1] + beside)[:, :4] / 2, atol=1e-7)
 

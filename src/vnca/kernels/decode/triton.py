@@ -1,5 +1,6 @@
 """Decoding on NVIDIA GPUs in torch's automatic differentiation, computed by Triton kernels."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -8,7 +9,7 @@ from torch.autograd.function import once_differentiable
 
 from vnca.errors import ShapeError
 from vnca.kernels.decode.weights import CORNERS, OUTPUTS, Weights
-from vnca.kernels.update.triton import LARGEST, MOST_CHANNELS, OPTIONS, TYPES, Precision
+from vnca.kernels.update.triton import LARGEST, OPTIONS, TYPES, Precision
 
 try:
     import triton
@@ -20,10 +21,11 @@ except ImportError:  # as `vnca.kernels.update.triton.unavailable` says
 
 PROGRAMS = 4
 """Programs for each multiprocessor; they take tiles of points in turns."""
-TILE = 64
-"""Points, or cells, that a program works on at a time."""
-MOST_UNITS = 64
-"""What fits into a multiprocessor with its gradient."""
+TILES = 64, 16, 64
+"""Points that a program works on at a time in the forward pass and in the network's gradient, and
+cells in the state's."""
+MOST_CHANNELS, MOST_UNITS = 32, 32
+"""What fits into a multiprocessor together with its gradient."""
 
 
 def decode(
@@ -74,9 +76,10 @@ class _Decode(torch.autograd.Function):
         points = len(fractions)
         out = state.new_empty(points, OUTPUTS)
         if points:
+            sizes = _sizes(tensors, TILES[0])
             with torch.cuda.device_of(state):
-                triton_kernels.forward_kernel[(_programs(fractions),)](
-                    *tensors, out, points, **_sizes(tensors), PRECISION=ctx.precision, **OPTIONS
+                triton_kernels.forward_kernel[(_programs(fractions, TILES[0]),)](
+                    *tensors, out, points, **sizes, PRECISION=ctx.precision, **OPTIONS
                 )
         return out
 
@@ -89,8 +92,8 @@ class _Decode(torch.autograd.Function):
         tensors = ctx.saved_tensors
         state, rows, fractions, *weights = tensors
         points, cells = len(fractions), len(state) - 1
-        sizes = _sizes(tensors)
-        programs = _programs(fractions)
+        sizes = _sizes(tensors, TILES[1])
+        programs = _programs(fractions, TILES[1])
         lengths = [weight.numel() for weight in weights]
         partials = state.new_empty((programs, sum(lengths)), dtype=torch.float32)
         to_between = state.new_empty((points, state.shape[1]), dtype=torch.float32)
@@ -110,7 +113,7 @@ class _Decode(torch.autograd.Function):
                     PRECISION=ctx.precision,
                     **OPTIONS,
                 )
-                triton_kernels.state_kernel[(triton.cdiv(cells + 1, TILE),)](
+                triton_kernels.state_kernel[(triton.cdiv(cells + 1, TILES[2]),)](
                     to_between,
                     fractions,
                     order.int(),
@@ -120,7 +123,7 @@ class _Decode(torch.autograd.Function):
                     cells,
                     sizes["C"],
                     sizes["WIDTH"],
-                    TILE,
+                    TILES[2],
                     **OPTIONS,
                 )
         parts = partials.sum(0).split(lengths)
@@ -131,7 +134,7 @@ class _Decode(torch.autograd.Function):
         return to_state, None, None, *to_weights, None
 
 
-def _sizes(tensors: list[Tensor] | tuple[Tensor, ...]) -> dict[str, int]:
+def _sizes(tensors: Sequence[Tensor], tile: int) -> dict[str, int]:
     """What the kernels are compiled for."""
     units, channels = tensors[3].shape
     return {
@@ -139,15 +142,15 @@ def _sizes(tensors: list[Tensor] | tuple[Tensor, ...]) -> dict[str, int]:
         "H": units,
         "WIDTH": max(16, triton.next_power_of_2(channels)),
         "UNITS": max(16, triton.next_power_of_2(units)),
-        "TILE": TILE,
+        "TILE": tile,
     }
 
 
-def _programs(fractions: Tensor) -> int:
+def _programs(fractions: Tensor, tile: int) -> int:
     processors = 1
     if fractions.device.type == "cuda":
         processors = torch.cuda.get_device_properties(fractions.device).multi_processor_count
-    return min(triton.cdiv(len(fractions), TILE), PROGRAMS * processors)
+    return min(triton.cdiv(len(fractions), tile), PROGRAMS * processors)
 
 
 def _check(state: Tensor, rows: Tensor, fractions: Tensor, weights: Weights) -> None:
