@@ -47,7 +47,7 @@ sanitize: setup
 	for kind in thread address,undefined; do \
 	  $(BIN)/cmake -S . -B build/sanitize-$$kind -DVNCA_SANITIZE=$$kind && \
 	  $(BIN)/cmake --build build/sanitize-$$kind && \
-	  build/sanitize-$$kind/test_step || exit 1; \
+	  build/sanitize-$$kind/test_step && build/sanitize-$$kind/test_decode || exit 1; \
 	done
 
 # Coverage-guided; the seconds are shared by all targets. Findings are left in build/fuzz.

@@ -2,6 +2,7 @@ import json
 import math
 import struct
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
+from vnca.automaton.decoder import Decoder
 from vnca.automaton.model import MODEL_NAME, Model, from_record
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import FileFormatError, ModelError, OptionError, OutputError, ShapeError
@@ -57,6 +59,69 @@ def test_a_model_comes_back_as_it_was_saved(model: Model, tmp_path: Path) -> Non
     np.testing.assert_array_equal(back.style, model.style)
 
 
+def with_decoder(model: Model) -> Model:
+    decoder = Decoder.initial(model.rule.config.channels, units=6, seed=2)
+    return replace(model, rule=replace(model.rule, decoder=decoder))
+
+
+def version_of(path: Path) -> int:
+    with safe_open(path, framework="numpy") as file:
+        return json.loads(file.metadata()["vnca"])["format_version"]
+
+
+def test_a_decoder_comes_back_as_it_was_saved(model: Model, tmp_path: Path) -> None:
+    path = tmp_path / MODEL_NAME
+    decoded = with_decoder(model)
+    decoded.save(path)
+    assert version_of(path) == 2
+    back = Model.load(path).rule.decoder
+    assert back is not None
+    assert decoded.rule.decoder is not None
+    for array, expected in zip(back.weights, decoded.rule.decoder.weights, strict=True):
+        assert array.dtype == np.float32
+        assert array.tobytes() == expected.tobytes()
+
+
+def test_a_model_without_a_decoder_can_be_read_by_earlier_versions(
+    model: Model, tmp_path: Path
+) -> None:
+    path = tmp_path / MODEL_NAME
+    model.save(path)
+    assert version_of(path) == 1
+    assert Model.load(path).rule.decoder is None
+    rewritten(path, format_version=2)
+    assert Model.load(path).rule.decoder is None
+
+
+@pytest.mark.parametrize(
+    ("name", "tensor", "words"),
+    [
+        ("decoder.third", None, r"damaged.*'decoder\.third'"),
+        ("decoder.second_bias", np.zeros(6, np.int8), r"'decoder\.second_bias': expected floats"),
+        ("decoder.second_bias", np.full(6, -1e300), "'second_bias': not all finite"),
+        ("decoder.third", np.zeros((6, 5), np.float32), "'third': .* fits no network"),
+        ("decoder.first", np.zeros((6, 4), np.float32), "expected 5 channels as the rule has"),
+        ("decoder.first", np.zeros((6, 0), np.float32), "'first': .* fits no network"),
+        ("decoder.first", np.zeros((), np.float32), "'first': .* fits no network"),
+        ("decoder.output", np.zeros((5, 6), np.float32), "'output': .* fits no network"),
+    ],
+)
+def test_a_decoder_that_cannot_be_used_is_one_clear_line(
+    model: Model, tmp_path: Path, name: str, tensor: AnyArray | None, words: str
+) -> None:
+    path = tmp_path / MODEL_NAME
+    with_decoder(model).save(path)
+    with safe_open(path, framework="numpy") as file:
+        metadata = file.metadata()
+    tensors = load_file(path)
+    del tensors[name]
+    save_file(tensors if tensor is None else {**tensors, name: tensor}, path, metadata=metadata)
+    with pytest.raises(ModelError, match=words) as caught:
+        Model.load(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
 def test_saving_twice_gives_the_same_bytes(model: Model, tmp_path: Path) -> None:
     model.save(tmp_path / "a.safetensors")
     model.save(tmp_path / "b.safetensors")
@@ -75,7 +140,7 @@ def rewritten(path: Path, **changes: Any) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"format_version": 2}, r"newer than this vnca reads.*upgrade"),
+        ({"format_version": 3}, r"newer than this vnca reads.*upgrade"),
         ({"format_version": "one"}, "damaged"),
         ({"rule": None}, "damaged"),
         ({"rule": 3}, "damaged"),

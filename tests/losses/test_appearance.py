@@ -313,15 +313,15 @@ def test_misshapen_input_is_refused(network: FeatureNetwork, loss: AppearanceLos
 
 @pytest.mark.usefixtures("unchecked_shapes")
 def test_what_is_compared_in_grey_may_be_a_picture_of_its_own(
-    vgg: VGG16, painting: FloatArray, loss: AppearanceLoss
+    network: FeatureNetwork, painting: FloatArray, loss: AppearanceLoss
 ) -> None:
     picture, opaque = noise(), torch.ones(1, SIZE, SIZE)
     luma = luminance(picture)
     assert loss(picture, opaque, generator(), luma).total == measured(loss, picture).total
     # Only what is in grey is another, and only that has a gradient.
     other = luminance(noise(5)).requires_grad_()
-    config = AppearanceConfig(layers=LAYERS, colour=False, pixels=0.0)
-    grey_alone = AppearanceLoss(vgg, painting, config, SIZE)
+    config = AppearanceConfig(**{**few(network), "colour": False, "pixels": 0.0})
+    grey_alone = AppearanceLoss(network, painting, config, SIZE)
     total = grey_alone(picture, opaque, generator(), other).total
     assert total == measured(grey_alone, noise(5)).total
     total.backward()
