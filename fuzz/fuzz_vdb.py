@@ -1,7 +1,8 @@
 """Fuzzing of OpenVDB files: headers, trees, arrays, and the smoke they hold.
 
 An input is a list of parts: what comes ahead of the first grid, then three for each grid, namely
-names, head with topology, and values. The offsets between them are filled in here.
+names, head with topology, and values. The offsets between them are filled in here, unless the
+input brings its own; and the file claims to have offsets, or not, as the input says.
 """
 
 import struct
@@ -24,7 +25,7 @@ with atheris.instrument_imports(include=["vnca"]):
     from vnca.typing import Box
 
 _BETWEEN = b"\xfe\xfd\xfe"
-_AHEAD = 57  # bytes of the header
+_AHEAD, _CLAIMS_OFFSETS = 57, 20  # bytes of the header, and which of them says that
 _METADATA = ("class", "file_bbox_min", "file_bbox_max")
 _REACH = Box((-9, -9, -9), (10, 10, 10))
 
@@ -109,7 +110,18 @@ def seeds() -> Iterator[bytes]:
                 grid.tree = grid.tree._replace(tiles=tiles)
             metadata = {"title": "x"} if number % 2 else None
             write_vdb(path, grids, metadata, ("none", "zip", "blosc")[number % 3])
-            yield taken_apart(path.read_bytes())
+            content = bytearray(path.read_bytes())
+            yield taken_apart(bytes(content))
+            yield without_offsets(taken_apart(bytes(content)))
+            content[_CLAIMS_OFFSETS] = False
+            yield taken_apart(bytes(content))
+
+
+def without_offsets(data: bytes) -> bytes:
+    """The same input with offsets of its own: the least that OpenVDB needs for a single grid."""
+    parts = data.split(_BETWEEN)
+    parts[1::3] = [shortened(b"\x80" + lengthened(names)[1:] + bytes(24)) for names in parts[1::3]]
+    return _BETWEEN.join(parts)
 
 
 if __name__ == "__main__":

@@ -96,9 +96,11 @@ def test_a_file_and_its_name_reach_the_disk_before_the_write_is_over(
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("none", "no such"), ("empty", "empty"), (".", "folder")]
+    ("name", "words"),
+    [("none", "no such file$"), ("empty", "empty"), (".", "folder"), ("link", "a link to gone$")],
 )
 def test_unusable_inputs_are_named(tmp_path: Path, name: str, words: str) -> None:
     (tmp_path / "empty").write_bytes(b"")
+    (tmp_path / "link").symlink_to("gone")
     with pytest.raises(FileFormatError, match=words):
         existing_file(tmp_path / name)

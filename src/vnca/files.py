@@ -130,7 +130,8 @@ def existing_file(path: Path) -> Path:
     try:
         status = path.stat()
     except (FileNotFoundError, NotADirectoryError):
-        raise FileFormatError(f"{path}: no such file") from None
+        target = f": it is a link to {path.readlink()}" if path.is_symlink() else ""
+        raise FileFormatError(f"{path}: no such file{target}") from None
     except OSError as error:
         raise FileFormatError(f"{path}: cannot be read ({error.strerror})") from error
     if not stat.S_ISREG(status.st_mode):

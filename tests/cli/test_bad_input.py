@@ -154,21 +154,23 @@ def test_velocity_that_does_not_meet_the_density(
     assert "do not meet" in complaint
 
 
-def test_velocity_with_another_transform(vnca: Vnca, model: Path, frame: Path, out: Path) -> None:
-    def coarser(grids: dict[str, Grid]) -> list[Grid]:
+def test_velocity_of_larger_cells_somewhere_else(
+    vnca: Vnca, model: Path, frame: Path, out: Path
+) -> None:
+    def elsewhere(grids: dict[str, Grid]) -> list[Grid]:
         old = grids["velocity"]
         values, active = old.to_dense(old.active_box())
-        transform = Transform.from_matrix(np.diag([0.2, 0.2, 0.2, 1]))
+        transform = Transform.uniform(0.2, (50, 0, 0))
         origin = old.active_box().lower
         return [
             grids["density"],
             Grid.from_dense("velocity", values, active, origin, transform=transform),
         ]
 
-    rewritten(frame, coarser)
+    rewritten(frame, elsewhere)
     complaint = vnca("stylize", model, frame, "--out", out).complaint
-    assert "another transform" in complaint
-    assert "resample" in complaint
+    assert f"{frame}: velocity grid 'velocity' has no value near the smoke" in complaint
+    assert "--velocity-grid none" in complaint
 
 
 @pytest.mark.parametrize("name", ["density", "velocity"])

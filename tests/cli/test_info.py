@@ -3,6 +3,7 @@ from pathlib import Path
 from typing import Any
 
 from vnca.automaton.model import MODEL_NAME
+from vnca.io.vdb import write_vdb
 
 Vnca = Callable[..., Any]
 
@@ -22,6 +23,42 @@ def test_a_real_file_is_described(vnca: Vnca) -> None:
     assert outcome.code == 0
     assert "density" in outcome.out
     assert "saved as half" in outcome.out
+
+
+def test_grids_that_cannot_be_read_are_listed_beside_the_others(vnca: Vnca, tmp_path: Path) -> None:
+    original = Path(__file__).parents[1] / "data" / "with_frustum.vdb"
+    outcome = vnca("info", original)
+    assert outcome.code == 0
+    assert outcome.out.splitlines() == [
+        "OpenVDB file, 3 grids",
+        "  density: float, fog volume, (2, 2, 2) to (12, 12, 12), voxel 1, 1, 1",
+        "  clouds: float, fog volume, (2, 2, 2) to (12, 12, 12), NonlinearFrustumMap; "
+        "cannot be read, only copied",
+        "  vel: vec3s, unknown, (0, 0, 0) to (14, 14, 14), voxel 1, 1, 1",
+    ]
+    odd, data = tmp_path / "odd.vdb", bytearray(original.read_bytes())
+    at = data.index(b"Tree_vec3s_5_4_3")
+    data[at : at + 16] = b"Tree_quats_5_4_3"
+    odd.write_bytes(data)
+    lines = vnca("info", odd).out.splitlines()
+    assert lines[-1].startswith("  vel: quats, unknown, ")
+    assert lines[-1].endswith("voxel 1, 1, 1; cannot be read, only copied")
+    data[20] = 0  # a stream: nothing tells where the grid of unknown kind would end
+    at = data.index(b"Tree_float_5_4_3", data.index(b"clouds"))
+    data[at : at + 16] = b"Tree_quats_5_4_3"
+    odd.write_bytes(data)
+    outcome = vnca("info", odd)
+    assert outcome.code == 0
+    assert outcome.out.splitlines()[0] == "OpenVDB file, 3 grids"
+    assert "NonlinearFrustumMap; cannot be read or copied" in outcome.out
+    assert "1 more cannot be found: the file has no offsets" in outcome.out
+
+
+def test_a_file_without_grids_is_described(vnca: Vnca, tmp_path: Path) -> None:
+    write_vdb(tmp_path / "a.vdb", [], {"shot": "7b"})
+    assert vnca("info", tmp_path / "a.vdb").out.splitlines() == [
+        "OpenVDB file, 0 grids", "  shot = 7b",
+    ]  # fmt: skip
 
 
 def test_a_model_and_its_run_are_described_alike(vnca: Vnca, model: Path) -> None:

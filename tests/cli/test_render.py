@@ -59,6 +59,16 @@ def test_pictures_are_numbered_like_their_frames(render: Callable[..., Path]) ->
     assert names == ["frame_0001.png", "frame_0002.png", "frame_0003.png"]
 
 
+def test_pictures_of_frames_below_zero_are_in_the_order_of_their_frames(
+    render: Callable[..., Path], smoke: Path
+) -> None:
+    for number, name in ((1, "ball_-0010"), (2, "ball_-0009"), (3, "ball_0000")):
+        (smoke / f"ball_{number:04d}.vdb").rename(smoke / f"{name}.vdb")
+    folder = render("frame_##.png", "--frames", "-10--9,0").parent
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["frame_-09.png", "frame_-10.png", "frame_00.png"]
+
+
 def test_one_frame_is_one_picture(render: Callable[..., Path]) -> None:
     image = pixels(render("one.png", "--frames", "2"))
     assert image.shape == (32, 40, 3)
@@ -113,15 +123,16 @@ def test_smoke_is_drawn_in_the_colours_of_its_grid(
     assert pixels(render("white.png", *options))[16, 20].min() > 0.9
 
 
+@pytest.mark.parametrize("has_grid", [True, False])
 def test_a_frame_without_smoke_is_background(
-    vnca: Vnca, render: Callable[..., Path], smoke: Path
+    vnca: Vnca, render: Callable[..., Path], smoke: Path, has_grid: bool
 ) -> None:
     path = smoke / "ball_0001.vdb"
     with open_vdb(path) as file:
         density = file.grids["density"].read()
         nothing = np.zeros((0, 0, 0), np.float32)
         empty = Grid.from_dense("density", nothing, nothing == 0, (0, 0, 0), like=density)
-        write_vdb(path, [empty])
+        write_vdb(path, [empty] if has_grid else [])
     folder = render("frame_#.png").parent
     assert pixels(folder / "frame_1.png").max() < 0.1
     assert pixels(folder / "frame_2.png").max() > 0.5

@@ -167,6 +167,23 @@ def test_a_frame_without_smoke_passes_through(painted: Paint, smoke: Path, cells
     assert np.isfinite(dense(grids(out / "ball_0003.vdb")["Cd"])[0]).all()
 
 
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_file_without_grids_is_a_frame_without_smoke(
+    painted: Paint, smoke: Path, number: int
+) -> None:
+    name = f"ball_000{number}.vdb"
+    write_vdb(smoke / name, [], {"shot": "shot 2"})
+    film = ("--preview", smoke.parent / "film.gif", "--film.rows", 32, "--film.columns", 32)
+    out = painted(*film)
+    with open_vdb(out / name) as file:
+        assert file.names == ()
+        assert file.metadata.value("shot") == "shot 2"
+    others = sorted(path.name for path in smoke.iterdir() if path.name != name)
+    assert sorted(path.name for path in out.iterdir()) == sorted([name, *others])
+    for other in others:
+        assert np.isfinite(dense(grids(out / other)["Cd"])[0]).all()
+
+
 def test_smoke_of_another_resolution_without_velocity(painted: Paint, tmp_path: Path) -> None:
     density = np.random.default_rng(0).random((21, 6, 17)).astype(np.float32)
     for number in (7, 8):

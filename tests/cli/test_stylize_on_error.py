@@ -61,6 +61,12 @@ def truncate(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:100])
 
 
+def unlink(path: Path) -> None:
+    """Leave a link to a file that is not there."""
+    path.unlink()
+    path.symlink_to(path.with_name("gone.vdb"))
+
+
 def colours(path: Path) -> bytes:
     with open_vdb(path) as file:
         grid = file.grids["Cd"].read()
@@ -99,7 +105,7 @@ def test_a_frame_whose_header_is_broken_stops_before_long_work(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("harm", [poison, truncate, lambda path: path.write_bytes(b"")])
+@pytest.mark.parametrize("harm", [poison, truncate, unlink, lambda path: path.write_bytes(b"")])
 def test_a_skipped_frame_leaves_a_gap_and_one_line(
     paint: Paint, smoke: Path, tmp_path: Path, harm: Callable[[Path], object]
 ) -> None:
@@ -148,6 +154,20 @@ def test_a_broken_first_frame_has_none_before_it_to_hold(
     assert "ball_0001.vdb" in outcome.err
     assert "leaving it out" in outcome.err
     assert names(tmp_path / "out") == ["ball_0002.vdb", "ball_0003.vdb"]
+
+
+def test_a_last_frame_that_is_a_link_to_nothing_is_not_dropped(
+    paint: Paint, smoke: Path, tmp_path: Path
+) -> None:
+    last = smoke / "ball_0003.vdb"
+    unlink(last)
+    assert (
+        paint("out").complaint == f"vnca: {last}: no such file: it is a link to {last.readlink()}"
+    )
+    assert not (tmp_path / "out").exists()
+    outcome = paint("out", "--on-error", "hold")
+    assert f"{last.readlink()}; holding frame 2 in its place" in outcome.err
+    assert names(tmp_path / "out") == ["ball_0001.vdb", "ball_0002.vdb", "ball_0003.vdb"]
 
 
 @pytest.mark.parametrize("on_error", ["skip", "hold"])

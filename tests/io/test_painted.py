@@ -6,10 +6,10 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from vnca.errors import OptionError, OutputError, ShapeError
+from vnca.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.io.painted import read_colour, write_painted, write_smoke
 from vnca.io.sequence import find_frames
-from vnca.io.smoke import read_smoke, with_fitted_scale
+from vnca.io.smoke import read_smoke, smoke_box, with_fitted_scale
 from vnca.io.smoke_format import SmokeFormat
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 from vnca.typing import AnyArray, Box, FloatArray
@@ -79,9 +79,10 @@ def test_a_painted_file_has_new_density_and_colour_and_all_the_rest(
         for grid in (new, cd):
             assert grid.is_half
             assert grid.transform == old.transform
-            assert grid.metadata.value("note") == "of density"
             np.testing.assert_array_equal(grid.tree.leaf_active, old.tree.leaf_active)
             np.testing.assert_array_equal(grid.tree.leaf_origins, old.tree.leaf_origins)
+        assert new.metadata.value("note") == "of density"
+        assert "note" not in cd.metadata
         values, active = cd.to_dense(Box(ORIGIN, (5, 8, 13)))
         cell = (2, 4, 1)
         assert active[cell]
@@ -164,6 +165,144 @@ def test_painted_density_is_never_cut_to_whole_numbers(tmp_path: Path, dtype: ty
     with open_vdb(target) as file:
         assert file.grids["density"].value_type == ("double" if dtype is np.float64 else "float")
         assert file.grids["Cd"].value_type == "vec3s"
+
+
+def paint(source: Path, *, refine: int = 1, density: float = 2) -> Path:
+    """The source painted with an even density and grey."""
+    volume = read_smoke(source, PLAIN).refined(refine)
+    target = source.with_name("painted.vdb")
+    write_painted(
+        target, source, PLAIN, box=volume.box, refine=refine,
+        density=np.full(volume.density.shape, density, np.float32),
+        colour=np.full((*volume.density.shape, 3), 0.5, np.float32),
+    )  # fmt: skip
+    return target
+
+
+@pytest.mark.parametrize("refine", [1, 2])
+@pytest.mark.parametrize("half", [True, False])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32])
+def test_a_colour_has_of_the_densitys_metadata_what_is_true_of_it(
+    dtype: type, half: bool, refine: int, tmp_path: Path
+) -> None:
+    name_of_type = {np.float32: "float", np.float64: "double", np.int32: "int32"}[dtype]
+    metadata = {
+        "class": "fog volume", "is_local_space": False, "is_saved_as_half_float": half,
+        "value_type": name_of_type, "grid_type": name_of_type, "vector_type": "invariant",
+        "greatest": 0.7, "file_base_resolution": (8, 8, 8), "file_bbox_min": (-9, -9, -9),
+    }  # fmt: skip
+    values = np.ones((3, 4, 5), dtype)
+    grid = Grid.from_dense(
+        "density", values, values > 0, (0, 0, 0), transform=Transform.uniform(1), half=half,
+        metadata=metadata,
+    )  # fmt: skip
+    write_vdb(tmp_path / "source.vdb", [grid])
+    with open_vdb(paint(tmp_path / "source.vdb", refine=refine)) as file:
+        density, colour = file.grids["density"].metadata, file.grids["Cd"].metadata
+    upper = (3 * refine - 1, 4 * refine - 1, 5 * refine - 1)
+    for of_grid in (density, colour):
+        assert of_grid.value("file_bbox_min") == (0, 0, 0)
+        assert of_grid.value("file_bbox_max") == upper
+        assert of_grid.value("file_voxel_count") == 60 * refine**3
+        assert of_grid.value("class") == "fog volume"
+        assert of_grid.value("is_local_space") is False
+    statistics = {name for name in colour if name.startswith("file_")}
+    own = {"class", "is_local_space", "name"} | ({"is_saved_as_half_float"} if half else set())
+    assert set(colour) - statistics == own
+    assert (density.value("name"), colour.value("name")) == ("density", "Cd")
+    assert density.value("greatest") == 0.7
+    # Whole numbers become float: what says otherwise goes.
+    expected = None if dtype is np.int32 else name_of_type
+    assert density.value("value_type") == density.value("grid_type") == expected
+    # And what tells of the coarser cells.
+    assert density.value("file_base_resolution") == ((8, 8, 8) if refine == 1 else None)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "half", "background"),
+    [(np.float32, False, 0.25), (np.float32, True, 0.25), (np.float64, False, -1.5),
+     (np.int32, False, 3)],
+)  # fmt: skip
+@pytest.mark.parametrize("refine", [1, 2])
+def test_a_painted_density_keeps_its_background_and_cells_without_density_stay_empty(
+    dtype: type, half: bool, background: float, refine: int, tmp_path: Path
+) -> None:
+    values = np.arange(27).reshape(3, 3, 3).astype(dtype)  # the first is active and zero
+    active = values != 13
+    grid = Grid.from_dense(
+        "density", values, active, (-1, 2, 3), transform=Transform.uniform(1), half=half,
+        background=background,
+    )  # fmt: skip
+    write_vdb(tmp_path / "source.vdb", [grid])
+    assert read_smoke(tmp_path / "source.vdb", PLAIN).density[1, 1, 1] == 0
+    with open_vdb(paint(tmp_path / "source.vdb", refine=refine, density=0)) as file:
+        density, colour = file.read("density"), file.read("Cd")
+    assert density.tree.background == background
+    np.testing.assert_array_equal(colour.tree.background, 0)
+    box = Box((-1, 2, 3), (2, 5, 6)).refined(refine)
+    painted, is_active = density.to_dense(box.grown(1))
+    inside = box.slices(box.grown(1))
+    finer = active.repeat(refine, 0).repeat(refine, 1).repeat(refine, 2)
+    np.testing.assert_array_equal(is_active[inside], finer)
+    assert is_active.sum() == finer.sum()
+    np.testing.assert_array_equal(painted[is_active], 0)
+    np.testing.assert_array_equal(painted[~is_active], background)
+
+
+def test_a_file_without_grids_is_a_frame_without_smoke(tmp_path: Path) -> None:
+    source = tmp_path / "source.vdb"
+    write_vdb(source, [], metadata={"shot": "7b"})
+    volume = read_smoke(source, PLAIN, frame=3)
+    assert (volume.density.size, volume.velocity, volume.frame) == (0, None, 3)
+    assert smoke_box(source, PLAIN).is_empty
+    target = paint(source)
+    with open_vdb(target) as file:
+        assert file.names == ()
+        assert file.metadata.value("shot") == "7b"
+    colour = read_colour(target, PLAIN, grid="Cd", box=volume.box)
+    assert colour is not None
+    assert colour.shape == (0, 0, 0, 3)
+
+
+def test_a_file_of_other_grids_is_no_frame_without_smoke(source: Path) -> None:
+    form = SmokeFormat(density_grid="smoke")
+    listed = (
+        r"source\.vdb: no density grid 'smoke'; choose with --density-grid from "
+        r"heat \(float\), density \(float\), Cd \(vec3s\), velocity \(vec3s\)$"
+    )
+    for read in (read_smoke, smoke_box):
+        with pytest.raises(GridError, match=listed):
+            read(source, form)
+
+
+def test_a_stream_is_painted_as_the_file_it_was(source: Path) -> None:
+    painted = paint(source).read_bytes()
+    data = source.read_bytes()
+    source.write_bytes(data[:20] + b"\0" + data[21:])
+    assert paint(source).read_bytes() == painted
+
+
+def test_a_grid_that_cannot_be_read_passes_through_or_stops_the_painting(tmp_path: Path) -> None:
+    source = tmp_path / "source.vdb"
+    original = Path(__file__).parents[1] / "data" / "with_frustum.vdb"
+    source.write_bytes(original.read_bytes())
+    with open_vdb(source) as before, open_vdb(paint(source)) as after:
+        assert after.names == ("density", "clouds", "vel", "Cd")
+        old, new = before.grids["clouds"], after.grids["clouds"]
+        assert (new.map_type, new.metadata) == (old.map_type, old.metadata)
+        old_end, new_end = old.end or 0, new.end or 0
+        length = old_end - old.transform_start
+        assert (tmp_path / "painted.vdb").read_bytes()[
+            new_end - length : new_end
+        ] == source.read_bytes()[old_end - length : old_end]
+    # As a stream, of a kind that nobody knows: where it ends cannot be told.
+    data = bytearray(source.read_bytes().replace(b"NonlinearFrustumMap", b"NonlinearCarouselMp"))
+    data[20] = 0
+    source.write_bytes(data)
+    (tmp_path / "painted.vdb").unlink()
+    with pytest.raises(GridError, match=r"source\.vdb: grid 'clouds' is of type float behind a "):
+        paint(source)
+    assert [path.name for path in tmp_path.iterdir()] == ["source.vdb"]
 
 
 def test_a_frame_without_smoke_passes_through(tmp_path: Path) -> None:

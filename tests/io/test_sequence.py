@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vnca.errors import OptionError, SequenceError
-from vnca.io.sequence import find_frames, format_frames, parse_frames
+from vnca.io.sequence import find_frames, format_frames, frames_beside, parse_frames
 
 
 def make(folder: Path, *names: str) -> Path:
@@ -64,6 +64,134 @@ def test_a_range_without_any_frame_says_which_there_are(tmp_path: Path) -> None:
     make(tmp_path, *(f"s_{n:04d}.vdb" for n in (30, 31, 33)))
     with pytest.raises(SequenceError, match=r"no frame of 1-9; there are 30-31,33"):
         find_frames(tmp_path, "1-9")
+
+
+NEGATIVE = ("s.-0002.vdb", "s.-0001.vdb", "s.0000.vdb", "s.0001.vdb")
+
+
+@pytest.mark.parametrize("name", ["", "s.%04d.vdb", "s.####.vdb", "s.$F4.vdb", "s.%d.vdb", "s.*"])
+def test_numbers_below_zero_come_first(tmp_path: Path, name: str) -> None:
+    make(tmp_path, *NEGATIVE)
+    assert numbers(tmp_path / name) == [-2, -1, 0, 1]
+    assert numbers(tmp_path / name, "-1-1x2") == [-1, 1]
+    assert find_frames(tmp_path / name, "-3--1").gaps == (-3,)
+    assert find_frames(tmp_path / name)[0].path == tmp_path / "s.-0002.vdb"
+
+
+def test_a_minus_may_count_as_one_of_the_digits_as_printf_has_it(tmp_path: Path) -> None:
+    make(tmp_path, "s_-010.vdb", "s_-009.vdb", "s_0001.vdb")
+    assert numbers(tmp_path / "s_%04d.vdb") == [-10, -9, 1]
+
+
+@pytest.mark.parametrize(
+    ("before", "sign"),
+    [
+        *(("smoke-", 1), ("smoke2-", 1), ("2026-11-", 1), ("smoke(b)-", 1), ("fumée-", 1)),
+        *(("smoke.-", -1), ("smoke_-", -1), ("smoke--", -1), ("smoke -", -1), ("-", -1)),
+    ],
+)
+def test_what_stands_before_a_dash_tells_whether_it_is_a_minus(
+    tmp_path: Path, before: str, sign: int
+) -> None:
+    make(tmp_path, *(f"{before}{number:04d}.vdb" for number in (1, 2, 10)))
+    expected = sorted(sign * number for number in (1, 2, 10))
+    assert numbers(tmp_path) == numbers(tmp_path / "*.vdb") == expected
+    assert numbers(tmp_path / f"{before}0010.vdb") == [10 * sign]
+    kept = before if sign == 1 else before[:-1]
+    assert numbers(tmp_path / f"{kept}$F4.vdb") == expected
+
+
+def test_a_pattern_that_ends_in_a_letter_finds_a_minus_beside_frame_0(tmp_path: Path) -> None:
+    make(tmp_path, *(f"s{number}.vdb" for number in ("-0002", "-0001", "0001")))
+    assert numbers(tmp_path / "s$F4.vdb") == [1]
+    make(tmp_path, "s0000.vdb")
+    assert numbers(tmp_path / "s$F4.vdb") == [-2, -1, 0, 1]
+    assert numbers(tmp_path / "s-$F4.vdb") == [1, 2]
+    with pytest.raises(SequenceError, match=r"choose one of s%04d\.vdb, s-%04d\.vdb"):
+        find_frames(tmp_path)
+    make(tmp_path, "s-0000.vdb")  # No number is written so: a sequence of its own.
+    assert numbers(tmp_path / "s$F4.vdb") == [0, 1]
+
+
+def test_a_pattern_does_not_take_a_separator_for_a_minus(tmp_path: Path) -> None:
+    make(tmp_path, "s-0001.vdb", "s-0002.vdb")
+    with pytest.raises(SequenceError, match=r"no file matches; .* holds s-0001\.vdb"):
+        find_frames(tmp_path / "s%04d.vdb")
+
+
+SUB_FRAMES = ("s.10.25.vdb", "s.10.5.vdb", "s.10.75.vdb", "s.10.vdb", "s.11.vdb")
+
+
+@pytest.mark.parametrize("name", ["", "s.*.vdb"])
+def test_sub_frames_are_left_out_only_where_whole_frames_are_asked_for(
+    tmp_path: Path, name: str
+) -> None:
+    make(tmp_path, *SUB_FRAMES)
+    whole = r"s\.10\.25\.vdb and 2 more are sub-frames.* whole frames with --frames 10-11$"
+    with pytest.raises(SequenceError, match=whole):
+        find_frames(tmp_path / name)
+    sequence = find_frames(tmp_path / name, "10-11")
+    assert [frame.number for frame in sequence] == [10, 11]
+    assert [path.name for path in sequence.sub_frames] == list(SUB_FRAMES[:3])
+    assert find_frames(tmp_path / "s.$F.vdb") == sequence
+
+
+@pytest.mark.parametrize("name", ["s.10.%d.vdb", "s.10.*.vdb", "s.$FF.vdb"])
+def test_sub_frames_are_no_frames(tmp_path: Path, name: str) -> None:
+    make(tmp_path, *SUB_FRAMES)
+    with pytest.raises(SequenceError, match="sub-frames"):
+        find_frames(tmp_path / name, "5")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("s.10.0625.vdb", "s.10.125.vdb", "s.10.1875.vdb"),
+        ("s.10.333333.vdb", "s.10.666667.vdb"),
+        ("s.10.5.vdb",),
+    ],
+)
+def test_fractions_of_any_length_are_sub_frames(tmp_path: Path, names: tuple[str, ...]) -> None:
+    make(tmp_path, "s.10.vdb", *names)
+    assert [path.name for path in find_frames(tmp_path, "10").sub_frames] == list(names)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("shot.10.0001.vdb", "shot.10.0002.vdb"),
+        ("s.v02.0010.vdb", "s.v02.0011.vdb"),
+        ("s.10.5.vdb", "s.10.6.vdb"),
+    ],
+)
+def test_a_number_in_the_name_is_no_frame(tmp_path: Path, names: tuple[str, ...]) -> None:
+    make(tmp_path, *names)
+    assert [frame.path.name for frame in find_frames(tmp_path)] == list(names)
+    assert find_frames(tmp_path).sub_frames == ()
+
+
+def test_padded_or_running_numbers_are_frames_also_beside_a_file_of_the_shot(
+    tmp_path: Path,
+) -> None:
+    make(tmp_path, "shot.10.vdb", "shot.10.0001.vdb", "shot.10.0002.vdb")
+    assert numbers(tmp_path / "shot.10.%04d.vdb") == [1, 2]
+    make(tmp_path / "running", "shot.10.vdb", *(f"shot.10.{number}.vdb" for number in (9, 10, 11)))
+    assert numbers(tmp_path / "running" / "shot.10.%d.vdb") == [9, 10, 11]
+
+
+def test_a_link_to_nothing_is_a_frame_that_is_missing(tmp_path: Path) -> None:
+    make(tmp_path, "s_1.vdb", "s_2.vdb")
+    (tmp_path / "s_3.vdb").symlink_to(tmp_path / "gone.vdb")
+    (tmp_path / "s_4.vdb").mkdir()
+    for name in ("", "s_*.vdb"):
+        assert numbers(tmp_path / name) == [1, 2, 3]
+    assert numbers(tmp_path / "s_3.vdb") == [3]
+
+
+def test_a_file_knows_the_frames_of_its_own_sequence(tmp_path: Path) -> None:
+    make(tmp_path, "a_2.vdb", "a_1.vdb", "b_7.vdb", "mask.vdb")
+    assert [frame.number for frame in frames_beside(tmp_path / "a_2.vdb")] == [1, 2]
+    assert frames_beside(tmp_path / "mask.vdb") == []
 
 
 def test_a_single_file_is_a_sequence_of_one(tmp_path: Path) -> None:
@@ -137,6 +265,10 @@ def test_numbers_that_are_no_frames_do_not_fill_the_memory(tmp_path: Path) -> No
         ("1,4,7-9", (1, 4, 7, 8, 9)),
         (" 7 - 9 , 1,8", (1, 7, 8, 9)),
         ("0007", (7,)),
+        ("-3", (-3,)),
+        ("-2-2", (-2, -1, 0, 1, 2)),
+        ("-2--1,3", (-2, -1, 3)),
+        ("-5 - -1 x 2", (-5, -3, -1)),
     ],
 )
 def test_ranges_mean_what_they_say(text: str, expected: tuple[int, ...]) -> None:
@@ -144,7 +276,7 @@ def test_ranges_mean_what_they_say(text: str, expected: tuple[int, ...]) -> None
 
 
 @pytest.mark.parametrize(
-    "text", ["", ",", "a", "3-", "-3", "5-3", "1-9x0", "1-5x", "1..5", "1-2-3", "1-99999999", "²"]
+    "text", ["", ",", "a", "3-", "5-3", "1-9x0", "1-5x", "1..5", "1-2-3", "1-99999999", "²"]
 )
 def test_ranges_that_mean_nothing_are_refused_in_one_line(text: str) -> None:
     with pytest.raises(OptionError, match=r"^frames: [^\n]*$"):
@@ -152,13 +284,13 @@ def test_ranges_that_mean_nothing_are_refused_in_one_line(text: str) -> None:
 
 
 @settings(deadline=None)
-@given(st.sets(st.integers(0, 500), min_size=1))
+@given(st.sets(st.integers(-500, 500), min_size=1))
 def test_formatted_frames_are_read_back(frames: set[int]) -> None:
     assert parse_frames(format_frames(frames)) == tuple(sorted(frames))
 
 
 @settings(deadline=None)
-@given(st.integers(0, 10**6), st.integers(0, 1000), st.integers(1, 50))
+@given(st.integers(-(10**6), 10**6), st.integers(0, 1000), st.integers(1, 50))
 def test_a_stepped_range_starts_at_its_first_and_never_passes_its_last(
     first: int, length: int, step: int
 ) -> None:

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from vnca.automaton.priors import told_velocity
-from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.automaton.rule import Rule, RuleConfig, Scales, density_scale
 from vnca.errors import GridError
 from vnca.training.config import TrainConfig, ViewConfig
 from vnca.training.smoke import choose_scales
@@ -15,7 +15,6 @@ from vnca.training.smoke_scene import (
     SPEEDS,
     STRONGEST,
     SmokeScene,
-    density_scale,
     smoke_bounds,
     velocity_scale,
 )

@@ -88,6 +88,12 @@ class Scales:
                 raise OptionError(f"scale '{name}' {getattr(self, name)}: must be positive")
 
 
+def density_scale(density: FloatArray) -> float:
+    """The density that counts as 1: the 99th percentile of what is not empty."""
+    smoke = density[density > 0]
+    return float(np.percentile(smoke, 99)) if len(smoke) else 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Rule:
     """A rule that can be applied: s' = s + m · W2 relu(W1 [perception ‖ priors] + b1).

@@ -68,20 +68,30 @@ def describe_model(path: Path) -> list[str]:
 def describe_vdb(path: Path) -> list[str]:
     """Lines about a VDB file: one a grid, then the metadata of the file."""
     with open_vdb(path) as file:
-        lines = [f"OpenVDB file, {len(file.grids)} grids"]
-        for header in file.grids.values():
-            lines += _describe_grid(header)
+        lines = [f"OpenVDB file, {len(file.grids) + file.unfound} grids"]
+        lines += map(_describe_grid, file.grids.values())
+        if file.unfound:
+            lines.append(
+                f"  {file.unfound} more cannot be found: the file has no offsets, and where the "
+                "grid before them ends is not known"
+            )
         lines += [f"  {name} = {entry.value}" for name, entry in file.metadata.items()]
     return lines
 
 
-def _describe_grid(header: GridHeader) -> list[str]:
+def _describe_grid(header: GridHeader) -> str:
     box = header.box
     extent = "box not in the header"
     if box is not None:
         extent = "empty" if box.is_empty else f"{box.lower} to {box.upper}"
-    sizes = ", ".join(f"{size:.6g}" for size in header.transform.voxel_size)
     half = " saved as half" if header.is_half else ""
-    return [
-        f"  {header.name}: {header.value_type}{half}, {header.grid_class}, {extent}, voxel {sizes}"
-    ]
+    place = header.map_type
+    if header.linear_transform is not None:
+        sizes = ", ".join(f"{size:.6g}" for size in header.linear_transform.voxel_size)
+        place = f"voxel {sizes}"
+    note = ""
+    if not header.is_readable:
+        is_copied = header.obstacle_to_copying is None
+        note = "; cannot be read, only copied" if is_copied else "; cannot be read or copied"
+    kind = f"{header.value_type}{half}, {header.grid_class}"
+    return f"  {header.name}: {kind}, {extent}, {place}{note}"

@@ -181,5 +181,7 @@ def _picture(frame: _Shown, box: Box, options: Render) -> FloatArray:
 
 
 def _numbered(path: Path, frame: int) -> Path:
-    """The path with its #### replaced by a frame number of as many digits."""
-    return path.with_name(re.sub("#+", lambda run: f"{frame:0{len(run[0])}d}", path.name))
+    """The path with its #### replaced by a frame number of as many digits, and its minus."""
+    sign = "-" if frame < 0 else ""
+    number = abs(frame)
+    return path.with_name(re.sub("#+", lambda run: f"{sign}{number:0{len(run[0])}d}", path.name))

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from vnca.automaton.rule import Rule
+from vnca.automaton.rule import SMOKE_THRESHOLD, Rule, density_scale
 from vnca.cli.options import say
 from vnca.errors import SequenceError
 from vnca.files import existing_file
 from vnca.io.orientation import on_lattice
-from vnca.io.sequence import FrameSequence, find_frames, format_frames
+from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
-from vnca.io.smoke_format import Extent
+from vnca.io.smoke_format import NO_VELOCITY, Extent
 from vnca.lattice import Lattice, Placement, Region
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.painter import BROKEN
@@ -24,7 +24,7 @@ from vnca.volume import Volume
 
 
 def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
-    """The frames of a pattern; gaps are told on standard error.
+    """The frames of a pattern; gaps and sub-frames are told on standard error.
 
     Raises:
         SequenceError: If there are none.
@@ -32,6 +32,9 @@ def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
     sequence = find_frames(pattern, frames)
     if sequence.gaps:
         say(f"{pattern}: no file for frames {format_frames(sequence.gaps)}; going on without")
+    if sequence.sub_frames:
+        count, first = len(sequence.sub_frames), sequence.sub_frames[0].name
+        say(f"{pattern}: leaving out {count} sub-frames ({first}, …); only whole frames are used")
     return sequence
 
 
@@ -58,7 +61,7 @@ def beside(path: Path, smoke: SmokeFormat) -> SmokeFormat:
     """
     if smoke.velocity_scale != "fit":
         return smoke
-    frames = find_frames(existing_file(path).parent)
+    frames = frames_beside(existing_file(path))
     places = [at for at, frame in enumerate(frames) if frame.path == path]
     if not places:
         raise SequenceError(
@@ -112,6 +115,41 @@ def sequence_region(
     if resampled:
         _tell_resampled(*resampled[0], lattice, others=len(resampled) - 1)
     return Region(lattice, box)
+
+
+def require_dense_enough(sequence: FrameSequence, smoke: SmokeFormat, scale: float) -> None:
+    """Refuse a sequence of which nothing would be painted, as with densities in another unit.
+
+    Reads frames up to the first that is dense enough; those that cannot be read are passed over.
+
+    Args:
+        sequence: The frames.
+        smoke: How they are read.
+        scale: The density that counts as 1.
+
+    Raises:
+        SequenceError: If no frame holds a cell that counts as smoke.
+    """
+    smoke = replace(smoke, velocity_grid=NO_VELOCITY)
+    most, typical, is_read = 0.0, 0.0, False
+    for frame in sequence:
+        try:
+            density = read_smoke(frame.path, smoke).density_field.values
+        except BROKEN:
+            continue
+        is_read = True
+        most = max(most, float(density.max(initial=0)))
+        if most > SMOKE_THRESHOLD * scale:
+            return
+        if density.any():
+            typical = max(typical, density_scale(density))
+    if is_read:
+        raise SequenceError(
+            f"{sequence[0].path.parent}: nothing would be painted, as the greatest density of all "
+            f"frames, {most:.3g}, is below {SMOKE_THRESHOLD:.0%} of the one that counts as 1, "
+            f"{scale:.3g}; "
+            + (f"try --density-scale {typical:.3g}" if most else "choose others with --frames")
+        )
 
 
 def _covered(extent: Extent, lattice: Lattice, what: str) -> tuple[Box, bool]:

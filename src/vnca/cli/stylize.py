@@ -20,7 +20,7 @@ from vnca.cli.film import Film, FilmConfig
 from vnca.cli.options import parse, say
 from vnca.cli.progress import Progress
 from vnca.cli.recorded import recorded_smoke
-from vnca.cli.sequence import open_sequence, placed, sequence_region
+from vnca.cli.sequence import open_sequence, placed, require_dense_enough, sequence_region
 from vnca.cli.termination import finishing
 from vnca.errors import BackendUnavailableError, OptionError
 from vnca.files import remove_leftovers, writable_file, writable_folder
@@ -132,6 +132,7 @@ def paint(options: Stylize, model: Model | None = None) -> None:
         raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
     smoke = with_fitted_scale(options.smoke, sequence)
     region = sequence_region(sequence, smoke, without_broken=options.on_error != "stop")
+    require_dense_enough(sequence, smoke, scales.density)
     rule = placed(rule, region)
     backend = choose(options.backend)
     roll = Roll(

@@ -30,7 +30,8 @@ from vnca.errors import GridError, OptionError
 from vnca.features.vgg import VGG16
 from vnca.files import remove_file
 from vnca.io.image import read_image
-from vnca.io.smoke import SmokeFormat
+from vnca.io.smoke import SmokeFormat, missing_velocity
+from vnca.io.smoke_format import NO_VELOCITY
 from vnca.texturing.beginning import SHAPE, SHARES, beginning_config, deaf_to_priors
 from vnca.texturing.config import TextureConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
@@ -115,6 +116,13 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
             f"{options.frame}: there is no smoke in this frame to train on; choose a later one"
         )
     config = options.config
+    if smoke.velocity is None:
+        if smoke_format.velocity_grid != NO_VELOCITY:
+            say(f"{missing_velocity(options.frame)}; the rule learns nothing of motion")
+        # Or it would be told in painting what training has not told it the meaning of.
+        config = dataclasses.replace(
+            config, rule=dataclasses.replace(config.rule, velocity_prior=False)
+        )
     torch.use_deterministic_algorithms(True)
     vgg = VGG16.load(config.features, device)
     with fitting(config, "this frame"):
@@ -160,10 +168,8 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
             trainer.begin_with(deaf_to_priors(texture))
         checkpoint = None
     notes = []
-    if config.motion.weight and not trainer.teaches_motion:
-        notes.append(
-            f"{options.frame}: no velocity in this frame; its texture is not taught to move"
-        )
+    if config.motion.weight and smoke.velocity is not None and not trainer.teaches_motion:
+        notes.append(f"{options.frame}: nothing moves in it; its texture is not taught to move")
     session.run(checkpoint, *notes)
     return options.out
 

@@ -25,6 +25,7 @@ from vnca.errors import FileFormatError, GridError
 from vnca.files import existing_file
 from vnca.io.smoke_format import (
     NO_VELOCITY,
+    NOT_WANTED,
     Extent,
     SmokeFormat,
     StoredSmoke,
@@ -72,6 +73,11 @@ def npz_smoke_extent(path: Path, format: SmokeFormat) -> Extent:
     return Extent(occupied_box(read_npz_density(path)), np.eye(4))
 
 
+def where_npz_velocity_is(path: Path) -> str:
+    """What to tell whoever expected velocity beside a file that has none."""
+    return f"it would be in a folder v beside a folder d with this file ({NOT_WANTED})"
+
+
 def read_npz_density(path: Path) -> FloatArray:
     """`[x, y, z]` over the whole domain.
 
@@ -112,7 +118,7 @@ def _stored_velocity(path: Path, domain: Box, box: Box, staggered: bool) -> Stor
     if values.shape[:3] != domain.shape:
         raise GridError(
             f"{path}: velocity of {values.shape[:3]} cells (x, y, z), the density beside it has "
-            f"{domain.shape}"
+            f"{domain.shape}; leave the velocity out with --velocity-grid none"
         )
     whole = upper_grown(box)
     inside = whole.intersection(domain)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vnca.bricks.field import Field
+from vnca.bricks.refinement import divided
 from vnca.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.io.npz import read_npz_smoke
 from vnca.io.orientation import UpAxis, on_lattice, own_cells, upright_world
@@ -15,10 +16,15 @@ from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, open_vdb, writ
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
 from vnca.lattice import Lattice, Placement
-from vnca.typing import Box, FloatArray
+from vnca.typing import AnyArray, Box, FloatArray
 from vnca.volume import Volume, refined_transform
 
 COLOUR_GRIDS = ("Cd",)
+# Metadata of a density that hold for a colour on its cells as well. All others may tell of its
+# name, its type, its values or its history.
+_SHARED_METADATA = ("class", "is_local_space")
+# Blender's, of the cells of a grid: not true of finer ones.
+_METADATA_OF_CELLS = ("file_base_resolution", "file_voxel_size")
 _HALF_MOST = float(np.finfo(np.float16).max)
 
 
@@ -36,8 +42,9 @@ def write_painted(
 ) -> None:
     """Write a frame of a sequence with new density and colour as a VDB file.
 
-    Both get the transform, metadata, active cells and half-float saving of the source's density;
-    every other grid of a VDB source is copied unchanged, except those the colours replace. The
+    Both get the transform, active cells and half-float saving of the source's density, and the
+    painted density its background and metadata, too. Every other grid of a VDB source is copied
+    unchanged, except those the colours replace; a source without grids makes a file without. The
     file has the source's axes: of an npz source, +y up, a voxel size of 1, and its velocity.
     Refined, density and colour get the transform of the finer cells, and those with density are
     active. Where the cells painted are not the source's, colour is interpolated to those, and what
@@ -60,7 +67,7 @@ def write_painted(
         ShapeError: If the arrays do not cover the source's density.
         OutputError: If the path cannot be written, or has another suffix than `.vdb`.
         FileFormatError: If the source cannot be read.
-        GridError: If the source has no density grid.
+        GridError: If the source has grids, but no density grid, or one that cannot be copied.
     """
     if density.shape != box.shape or colour.shape != (*box.shape, 3):
         raise ShapeError(
@@ -108,7 +115,8 @@ def read_colour(
 ) -> FloatArray | None:
     """Linear RGB `[x, y, z, 3]` over `box` of a painted frame, counted as by `read_smoke`.
 
-    None where the file has no grid of that name; black where the grid has no value.
+    None where the file has no grid of that name; black where the grid has no value, or the file
+    no grid at all.
 
     Raises:
         FileFormatError: If the file cannot be read.
@@ -117,6 +125,8 @@ def read_colour(
     if path.suffix.lower() != ".vdb":
         return None
     with open_vdb(path) as file:
+        if not file.grids:
+            return np.zeros((*box.shape, 3), np.float32)
         if grid not in file.grids:
             return None
         header = file.grids[grid]
@@ -190,11 +200,13 @@ class _Painting:
         finer = plain.refined(self.refine).density_field
         return replace(finer, values=finer.values * factor.blocks(finer.bricks)), colour
 
-    def active(self, density: Field, of_file: Field) -> Field:
+    def active(self, density: Field, of_file: Field, background: AnyArray | float = 0) -> Field:
         """Which cells to store; `of_file` are active in the file."""
         if self.refine == 1:
             return of_file
-        return replace(density, values=density.values != 0, outside=False).trimmed()
+        dense = replace(density, values=density.values != 0, outside=False).trimmed()
+        # A cell that is not stored would not be empty.
+        return dense.union(divided(of_file, self.refine)) if background else dense
 
     def transform(self, of_file: Transform) -> Transform:
         """That of the painted cells; `of_file` is that of the file's."""
@@ -214,11 +226,15 @@ def _paint_vdb(
     path: Path, source: Path, format: SmokeFormat, frame: _Painting, colour_grids: Sequence[str]
 ) -> None:
     with open_vdb(source) as file:
+        if not file.grids:
+            write_vdb(path, [], metadata=file.metadata)
+            return
         header, old, cells = read_density(file, format)
         what = f"{source}: grid {header.name!r}"
         before, active = old.fields(cells)
         density, colour = frame.in_file(old.transform, before, what)
-        active = frame.active(density, active)
+        background = old.tree.background
+        active = frame.active(density, active, background)
         transform = frame.transform(old.transform)
         dtype = VALUE_TYPES[old.value_type].dtype
         if dtype.kind != "f":
@@ -229,14 +245,21 @@ def _paint_vdb(
                 for field in (density, colour)
             )
         density = replace(density, values=density.values.astype(dtype))
-        new = Grid.from_fields(old.name, density, active, like=old, transform=transform)
+        new = Grid.from_fields(
+            old.name, density, active, like=old, transform=transform, background=background
+        )
+        for name in _METADATA_OF_CELLS if frame.refine > 1 else ():
+            new.metadata.pop(name, None)
         grids: list[Grid | GridHeader] = [
             new if name == header.name else other
             for name, other in file.grids.items()
             if name == header.name or decoded(other.grid_name) not in colour_grids
         ]
+        shared = {name: old.metadata[name] for name in _SHARED_METADATA if name in old.metadata}
         grids += [
-            Grid.from_fields(name, colour, active, like=old, transform=transform)
+            Grid.from_fields(
+                name, colour, active, transform=transform, metadata=shared, half=old.is_half
+            )
             for name in colour_grids
         ]
         write_vdb(path, grids, metadata=file.metadata)

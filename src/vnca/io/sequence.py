@@ -1,8 +1,15 @@
 """Sequences of frames: which files a pattern, a folder and a range of frames mean.
 
-A frame number is a whole number, not negative. Patterns with a number (`smoke_%04d.vdb`,
-`smoke.$F4.vdb`, `smoke_####.vdb`, `smoke_%d.vdb`, `smoke.$F.vdb`) and globs (`*`, `?`) stand for
-the name of a file; folders are taken as written.
+A frame number is a whole number. Patterns with a number (`smoke_%04d.vdb`, `smoke.$F4.vdb`,
+`smoke_####.vdb`, `smoke_%d.vdb`, `smoke.$F.vdb`) and globs (`*`, `?`) stand for the name of a file;
+folders are taken as written.
+
+A dash before the digits is a minus at the start of a name and after `.`, `_`, a space or another
+dash (`smoke.-0001`, `smoke--0001`). After anything else it is a separator, as in `smoke-0001`,
+unless a pattern leaves it to the number (`smoke%04d.vdb`) and finds frame 0 as well.
+
+`smoke.10.25` beside `smoke.10` is a sub-frame, a quarter of a frame after it. Sub-frames are told
+of and left out: a rule is taught its steps for whole frames, and velocity is in cells per frame.
 """
 
 import re
@@ -18,8 +25,10 @@ from vnca.io.smoke_format import UP_AXES
 
 MAX_FRAMES = 1_000_000
 _NUMBER = re.compile(r"%0?(?P<printf>\d*)d|\$F(?P<houdini>\d*)|(?P<hashes>#+)")
-_TRAILING = re.compile(r"\d{1,18}$", re.ASCII)
-_RANGE = re.compile(r"\s*(\d{1,18})(?:\s*-\s*(\d{1,18})(?:\s*x\s*(\d{1,18}))?)?\s*", re.ASCII)
+_SUB_FRAME_TOKEN = "$FF"
+_BEFORE_MINUS = "._- "
+_TRAILING = re.compile(rf"((?<![^{re.escape(_BEFORE_MINUS)}])-)?\d{{1,18}}\Z", re.ASCII)
+_RANGE = re.compile(r"\s*(-?\d{1,18})(?:\s*-\s*(-?\d{1,18})(?:\s*x\s*(\d{1,18}))?)?\s*", re.ASCII)
 
 
 class Frame(NamedTuple):
@@ -37,10 +46,12 @@ class FrameSequence(Sequence[Frame]):
         frames: By increasing number, at least one.
         gaps: Numbers that were asked for, or lie between the first and the last frame where no
             range was given, and have no file.
+        sub_frames: Files between the frames that are left out.
     """
 
     frames: tuple[Frame, ...]
     gaps: tuple[int, ...] = ()
+    sub_frames: tuple[Path, ...] = ()
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...
@@ -53,8 +64,17 @@ class FrameSequence(Sequence[Frame]):
         return len(self.frames)
 
 
+class _Found(NamedTuple):
+    """Files of one name that differ in their number."""
+
+    frames: list[Frame]
+    sub_frames: list[Path]
+
+
 def find_frames(pattern: str | Path, frames: str | None = None) -> FrameSequence:
     """The frames a pattern selects, by number.
+
+    A link to a file that is not there counts: it says that a frame is missing.
 
     Args:
         pattern: A file; a folder with one numbered sequence of `.vdb` or `.npz` files, or in
@@ -63,27 +83,41 @@ def find_frames(pattern: str | Path, frames: str | None = None) -> FrameSequence
         frames: Which numbers to take, see `parse_frames`; by default all.
 
     Raises:
-        SequenceError: If nothing is found, several sequences match, or one number has two files.
+        SequenceError: If nothing is found, several sequences match, one number has two files, or
+            there are sub-frames and neither the pattern nor `frames` asks for whole ones.
         OptionError: If `frames` cannot be read.
     """
     wanted = None if frames is None else parse_frames(frames)
     path = Path(pattern).expanduser()
-    if path.is_file():
-        found = [Frame(_trailing_number(path) or 0, path)]
+    if path.is_file() or (path.is_symlink() and not path.exists()):
+        found = _Found([Frame(_trailing_number(path) or 0, path)], [])
     elif path.is_dir():
-        found = _one_sequence(path, _folder_sequences(path))
+        found = _one_sequence(path, _folder_sequences(path), wanted)
+    elif _SUB_FRAME_TOKEN in path.name:
+        raise SequenceError(
+            f"{path}: {_SUB_FRAME_TOKEN} names sub-frames, which cannot be used; "
+            "$F names whole frames"
+        )
     elif _NUMBER.search(path.name):
         found = _matching_number(path)
     elif any(sign in path.name for sign in "*?["):
         matches = re.compile(translate(path.name)).match
-        found = _one_sequence(path, _sequences(p for p in _files(path) if matches(p.name)))
+        found = _one_sequence(path, _sequences(p for p in _files(path) if matches(p.name)), wanted)
     else:
         raise SequenceError(f"{path}: no such file or folder{_beside(path)}")
-    return _selected(path, sorted(found), wanted)
+    return _selected(path, found, wanted)
+
+
+def frames_beside(file: Path) -> list[Frame]:
+    """The frames, by number, of the sequence in its folder that a file belongs to; or none."""
+    for found in _sequences(_files(file)).values():
+        if any(frame.path == file for frame in found.frames):
+            return sorted(found.frames)
+    return []
 
 
 def parse_frames(text: str) -> tuple[int, ...]:
-    """Frame numbers written as `30-53`, `30-53x2` (every second) or `1,4,7-9`; sorted, each once.
+    """Frame numbers written as `30-53`, `30-53x2` (every second), `1,4,7-9` or `-5--2`, sorted.
 
     Raises:
         OptionError: If the text is something else, a range runs backwards or is huge.
@@ -116,9 +150,9 @@ def format_frames(numbers: Iterable[int]) -> str:
     return ",".join(f"{a}" if a == b else f"{a}-{b}" for a, b in runs)
 
 
-def _selected(path: Path, found: list[Frame], wanted: tuple[int, ...] | None) -> FrameSequence:
+def _selected(path: Path, found: _Found, wanted: tuple[int, ...] | None) -> FrameSequence:
     by_number: dict[int, Frame] = {}
-    for frame in found:
+    for frame in sorted(found.frames):
         other = by_number.setdefault(frame.number, frame)
         if other is not frame:
             raise SequenceError(
@@ -126,7 +160,7 @@ def _selected(path: Path, found: list[Frame], wanted: tuple[int, ...] | None) ->
                 f"{other.path.name} and {frame.path.name}"
             )
     if wanted is None:
-        first, last = found[0].number, found[-1].number
+        first, last = min(by_number), max(by_number)
         if last - first > MAX_FRAMES:
             raise SequenceError(
                 f"{path}: frame numbers run from {first} to {last}; choose some with --frames"
@@ -137,26 +171,45 @@ def _selected(path: Path, found: list[Frame], wanted: tuple[int, ...] | None) ->
         raise SequenceError(
             f"{path}: no frame of {format_frames(wanted)}; there are {format_frames(by_number)}"
         )
-    return FrameSequence(chosen, tuple(number for number in wanted if number not in by_number))
+    gaps = tuple(number for number in wanted if number not in by_number)
+    return FrameSequence(chosen, gaps, tuple(found.sub_frames))
 
 
-def _matching_number(path: Path) -> list[Frame]:
+def _matching_number(path: Path) -> _Found:
     """Files whose name is `path.name` with a number in place of its token."""
     if len(_NUMBER.findall(path.name)) > 1:
         raise SequenceError(f"{path}: expected one frame number in the name, found several")
     token = _NUMBER.search(path.name)
     assert token is not None
     digits = int(token["printf"] or token["houdini"] or len(token["hashes"] or "#"))
-    before, after = re.escape(path.name[: token.start()]), re.escape(path.name[token.end() :])
-    name = re.compile(rf"{before}(\d{{{digits},18}}){after}", re.ASCII)
-    matches = ((name.fullmatch(file.name), file) for file in _files(path))
-    found = [Frame(int(match[1]), file) for match, file in matches if match]
-    if not found:
+    before, after = path.name[: token.start()], path.name[token.end() :]
+    # For %04d, printf makes -001 of -1; for $F4, Houdini makes -0001.
+    number = rf"(\d{{{digits},18}}|-\d{{{max(1, digits - 1)},18}})"
+    name = re.compile(f"{re.escape(before)}{number}{re.escape(after)}", re.ASCII)
+    files = _files(path)
+    matches = [(match[1], file) for file in files if (match := name.fullmatch(file.name))]
+    if not _is_minus_after(before, [written for written, _ in matches]):
+        matches = [(written, file) for written, file in matches if not written.startswith("-")]
+    if not matches:
         raise SequenceError(f"{path}: no file matches{_beside(path)}")
-    return found
+    chosen, sub_frames = {file for _, file in matches}, []
+    for found in _sequences(files).values():
+        if not chosen.isdisjoint(found.sub_frames):
+            raise _no_sub_frames(path, found.sub_frames)
+        if not chosen.isdisjoint(frame.path for frame in found.frames):
+            sub_frames = found.sub_frames
+    return _Found([Frame(int(written), file) for written, file in matches], sub_frames)
 
 
-def _folder_sequences(folder: Path) -> dict[str, list[Frame]]:
+def _is_minus_after(before: str, written: Sequence[str]) -> bool:
+    """Whether a dash between `before` and digits is a minus, where these numbers are written."""
+    if before == "" or before[-1] in _BEFORE_MINUS:
+        return True
+    zeros = [number for number in written if int(number) == 0]
+    return bool(zeros) and not any(number.startswith("-") for number in zeros)
+
+
+def _folder_sequences(folder: Path) -> dict[str, _Found]:
     """Sequences in a folder; Mantaflow's `d/` counts as one where nothing else is there."""
     files = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in UP_AXES]
     sequences = _sequences(files)
@@ -165,7 +218,7 @@ def _folder_sequences(folder: Path) -> dict[str, list[Frame]]:
     return sequences
 
 
-def _sequences(files: Iterable[Path]) -> dict[str, list[Frame]]:
+def _sequences(files: Iterable[Path]) -> dict[str, _Found]:
     """Numbered files, grouped by what they share, under the pattern that selects them.
 
     Hidden files are none: a program that was killed leaves such.
@@ -173,29 +226,69 @@ def _sequences(files: Iterable[Path]) -> dict[str, list[Frame]]:
     groups: dict[tuple[str, str], list[Frame]] = {}
     for file in files:
         number = _trailing_number(file)
-        if number is not None and not file.name.startswith(".") and file.is_file():
+        if number is not None and not file.name.startswith(".") and not file.is_dir():
             prefix = _TRAILING.sub("", file.stem)
             groups.setdefault((prefix, file.suffix), []).append(Frame(number, file))
-    return {
-        f"{prefix}{_token(prefix, members)}{suffix}": members
-        for (prefix, suffix), members in groups.items()
-    }
+    sub_frames: dict[tuple[str, str], list[Path]] = {}
+    for (prefix, suffix), members in list(groups.items()):
+        if _are_sub_frames(prefix, members):
+            del groups[prefix, suffix]
+            whole = _TRAILING.sub("", prefix[:-1])
+            sub_frames.setdefault((whole, suffix), []).extend(frame.path for frame in members)
+    found: dict[str, _Found] = {}
+    for prefix, suffix in groups | sub_frames:
+        frames = groups.get((prefix, suffix), [])
+        name = f"{prefix}{_token(prefix, frames)}{suffix}"
+        found[name] = _Found(frames, sub_frames.get((prefix, suffix), []))
+    return found
+
+
+def _are_sub_frames(prefix: str, members: list[Frame]) -> bool:
+    """Whether numbers after `smoke.10.` are fractions of frame 10, rather than frames of a shot.
+
+    They are where `smoke.10` is a frame itself, unless they are padded as frames are (`0001`), or
+    run on as no fraction is written (`9`, `10`).
+    """
+    first = members[0].path
+    whole = first.with_name(f"{prefix[:-1]}{first.suffix}")
+    if not prefix.endswith(".") or _trailing_number(whole) is None or not whole.exists():
+        return False
+    digits = [frame.path.stem[len(prefix) :] for frame in members]
+    if not all(map(str.isdigit, digits)):
+        return False
+    if len(set(map(len, digits))) == 1:
+        return not any(number.startswith("0") for number in digits)
+    return not any(number.endswith("0") for number in digits)
 
 
 def _token(prefix: str, members: list[Frame]) -> str:
-    digits = [frame.path.stem[len(prefix) :] for frame in members]
+    digits = [frame.path.stem[len(prefix) :].removeprefix("-") for frame in members]
     padded = any(d.startswith("0") and len(d) > 1 for d in digits)
     return f"%0{min(map(len, digits))}d" if padded else "%d"
 
 
-def _one_sequence(path: Path, sequences: dict[str, list[Frame]]) -> list[Frame]:
+def _one_sequence(
+    path: Path, sequences: dict[str, _Found], wanted: tuple[int, ...] | None
+) -> _Found:
     if not sequences:
         raise SequenceError(f"{path}: no numbered .vdb or .npz file{_beside(path)}")
     if len(sequences) > 1:
         raise SequenceError(
             f"{path}: several sequences; choose one of {', '.join(sorted(sequences))}"
         )
-    return next(iter(sequences.values()))
+    ((pattern, found),) = sequences.items()
+    if found.sub_frames and (wanted is None or not found.frames):
+        whole = format_frames(frame.number for frame in found.frames)
+        instead = f"--frames {whole}" if whole else pattern
+        raise _no_sub_frames(path, found.sub_frames, f"; choose whole frames with {instead}")
+    return found
+
+
+def _no_sub_frames(path: Path, files: list[Path], instead: str = "") -> SequenceError:
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    return SequenceError(
+        f"{path}: {files[0].name}{more} are sub-frames, and only whole frames can be used{instead}"
+    )
 
 
 def _trailing_number(file: Path) -> int | None:

@@ -14,12 +14,12 @@ import numpy as np
 from vnca.bricks.field import Field
 from vnca.errors import FileFormatError, GridError, OptionError, SequenceError
 from vnca.files import existing_file
-from vnca.io.npz import npz_smoke_extent, read_npz_smoke
+from vnca.io.npz import npz_smoke_extent, read_npz_smoke, where_npz_velocity_is
 from vnca.io.orientation import on_lattice, own_cells, upright_world
 from vnca.io.painted import write_painted, write_smoke
 from vnca.io.sequence import Frame
 from vnca.io.smoke_format import Extent, SmokeFormat, StoredSmoke, StoredVelocity, up_axis_of
-from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_extent
+from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_extent, where_vdb_velocity_is
 from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
 from vnca.lattice import Lattice, Placement
 from vnca.typing import AnyArray, Box
@@ -29,6 +29,7 @@ __all__ = [
     "READERS",
     "Reader",
     "SmokeFormat",
+    "missing_velocity",
     "read_smoke",
     "smoke_box",
     "with_fitted_scale",
@@ -50,15 +51,17 @@ class Reader:
     Attributes:
         read: Reads a frame in the axes of its file.
         extent: The cells that hold smoke, in the axes of the file.
+        where_velocity_is: What to tell whoever expected velocity in a frame that has none.
     """
 
     read: Callable[[Path, SmokeFormat], StoredSmoke]
     extent: Callable[[Path, SmokeFormat], Extent]
+    where_velocity_is: Callable[[Path], str]
 
 
 READERS = {
-    ".vdb": Reader(read_vdb_smoke, vdb_smoke_extent),
-    ".npz": Reader(read_npz_smoke, npz_smoke_extent),
+    ".vdb": Reader(read_vdb_smoke, vdb_smoke_extent, where_vdb_velocity_is),
+    ".npz": Reader(read_npz_smoke, npz_smoke_extent, where_npz_velocity_is),
 }
 
 
@@ -120,6 +123,15 @@ def smoke_box(path: Path, format: SmokeFormat, *, lattice: Lattice | None = None
         return box
     place = Placement.between(index_to_world, lattice.to_world, box, _named(path, format))
     return place.box(box)
+
+
+def missing_velocity(path: Path) -> str:
+    """A line for whoever expected velocity in a frame that has none: where it could be.
+
+    Raises:
+        FileFormatError: If the file cannot be read.
+    """
+    return f"{path}: no velocity in this frame; {_reader(path).where_velocity_is(path)}"
 
 
 def with_fitted_scale(format: SmokeFormat, frames: Sequence[Frame]) -> SmokeFormat:
@@ -211,6 +223,8 @@ def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat)
     matrix = _to_cells_per_frame(smoke, format)  # refuses bad options, needed or not
     if velocity.in_cells_per_frame:
         matrix = np.eye(3)
+    if velocity.in_cells_per_frame or format.velocity_units != "m/s":
+        matrix = velocity.to_density @ matrix
     found, known = centred(velocity.values, velocity.stored, velocity.staggered)
     if not np.array_equal(matrix, np.eye(3)):
         found.values[known.values] = found.values[known.values] @ matrix.T.astype(np.float32)

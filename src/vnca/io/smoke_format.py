@@ -1,6 +1,6 @@
 """How to read smoke from a file, and what was read before it is made ours."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -13,6 +13,7 @@ from vnca.io.velocity import VelocityUnits
 from vnca.typing import AnyArray, BoolArray, Box, FloatArray
 
 NO_VELOCITY = "none"
+NOT_WANTED = "--velocity-grid none says that none is wanted"
 # What a velocity grid's metadata says of its units, where it was written by vnca.
 UNITS_METADATA = "velocity_units"
 CELLS_PER_FRAME: VelocityUnits = "cells/frame"
@@ -28,8 +29,8 @@ class SmokeFormat:
     """Name of the density grid."""
 
     velocity_grid: str | None = None
-    """Name of the velocity: one vector grid, or three scalar grids NAME.x, NAME.y and NAME.z. By
-    default the first there is of velocity, vel and v; "none" reads no velocity."""
+    """Name of the velocity: one vector grid, or three scalar grids such as NAME.x, NAME.y and
+    NAME.z. By default velocity, vel or v, also as Velocity, vel_x or velX; "none" reads none."""
 
     staggered: bool | None = None
     """Whether velocity lies on the lower faces of cells. By default as the file says: by grid
@@ -61,12 +62,15 @@ class StoredVelocity:
         stored: Which cells the file has.
         staggered: Which components lie on the lower faces of their cells.
         in_cells_per_frame: Whether the file itself says so; units and scale then do not count.
+        to_density: 3×3, from cells of the velocity's own grid to the density's. Units of cells
+            are of those, units of the world know none.
     """
 
     values: Field
     stored: Field
     staggered: tuple[bool, bool, bool]
     in_cells_per_frame: bool = False
+    to_density: AnyArray = field(default_factory=lambda: np.eye(3))
 
 
 class Extent(NamedTuple):

@@ -1,6 +1,5 @@
 """Smoke in OpenVDB files: which grids it is, and whether they fit together."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from vnca.bricks.places import bricks_beside, sorted_bricks
 from vnca.errors import FileFormatError, GridError
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
-    NO_VELOCITY,
+    NOT_WANTED,
     UNITS_METADATA,
     Extent,
     SmokeFormat,
@@ -20,11 +19,11 @@ from vnca.io.smoke_format import (
     single_precision,
     upper_grown,
 )
-from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, VdbFile, open_vdb
+from vnca.io.vdb import EMPTY_BOX, Grid, GridHeader, Transform, VdbFile, open_vdb
+from vnca.io.vdb_grids import components, listed_vectors, velocity_headers
+from vnca.io.vdb_velocity import resampled_velocity
 from vnca.typing import Box, IntArray
 
-VELOCITY_NAMES = ("velocity", "vel", "v")
-_AXES = "xyz"
 _CELL_TOLERANCE = 1e-3
 # A small file may hold 512³ cells, in tiles or packed well, one of 500 KB 2³¹.
 MOST_CELLS, MOST_CELLS_A_BYTE = 2**27, 2**12
@@ -33,13 +32,17 @@ MOST_CELLS, MOST_CELLS_A_BYTE = 2**27, 2**12
 def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
     """Density over the box of its active cells, and velocity where the file has it.
 
-    Inactive cells are empty, whatever value they store.
+    Inactive cells are empty, whatever value they store. A file without grids is a frame without
+    smoke, in a place of which nothing is known.
 
     Raises:
         FileFormatError: If the file cannot be read.
         GridError: If grids are missing, of the wrong kind, or do not fit together.
     """
     with open_vdb(path) as file:
+        if not file.grids:
+            nothing = Field.from_dense(np.zeros((0, 0, 0), np.float32), (0, 0, 0))
+            return StoredSmoke(nothing, np.eye(4), None)
         header, grid, box = read_density(file, format)
         density, _ = _finite(header, grid, box)
         return StoredSmoke(
@@ -54,12 +57,27 @@ def vdb_smoke_extent(path: Path, format: SmokeFormat) -> Extent:
 
     Raises:
         FileFormatError: If the file cannot be read.
-        GridError: If there is no density grid.
+        GridError: If there are grids, but no density grid.
     """
     with open_vdb(path) as file:
+        if not file.grids:
+            return Extent(EMPTY_BOX, np.eye(4))
         header = density_header(file, format)
         box = header.read().active_box() if header.box is None else header.box
         return Extent(box, header.transform.index_to_world)
+
+
+def where_vdb_velocity_is(path: Path) -> str:
+    """What to tell whoever expected velocity in a file that has none under a known name.
+
+    Raises:
+        FileFormatError: If the file cannot be read.
+    """
+    with open_vdb(path) as file:
+        vectors = listed_vectors(file)
+    if not vectors:
+        return f"no other grid of vectors either ({NOT_WANTED})"
+    return f"choose with --velocity-grid from {vectors} ({NOT_WANTED})"
 
 
 def density_header(file: VdbFile, format: SmokeFormat) -> GridHeader:
@@ -72,11 +90,11 @@ def density_header(file: VdbFile, format: SmokeFormat) -> GridHeader:
     if name not in file.names:
         raise GridError(
             f"{file.path}: no density grid {name!r}; "
-            f"choose with --density-grid from {_listed(file)}"
+            f"choose with --density-grid from {file.listed()}"
         )
     header = file.grids[name]
     label = f"{file.path}: density grid {name!r}"
-    if _components(header) == 3:
+    if components(header) == 3:
         raise GridError(f"{label} holds vectors, expected numbers; choose with --density-grid")
     if header.grid_class == "level set":
         raise GridError(f"{label} is a level set, expected a fog volume; convert it first")
@@ -107,75 +125,50 @@ def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, 
 def _read_velocity(
     file: VdbFile, format: SmokeFormat, density: Field, place: Transform
 ) -> StoredVelocity | None:
-    headers = _velocity_headers(file, format)
+    headers = velocity_headers(file, format)
     if not headers:
         return None
+    for header in headers:
+        if header.linear_transform is None:
+            raise GridError(
+                f"{file.path}: velocity grid {header.name!r} has a {header.map_type}, and only "
+                "linear transforms are supported; leave it out with --velocity-grid none"
+            )
     # A vector grid has one transform for all components, a scalar one its own.
     axes = (None,) if len(headers) == 1 else (0, 1, 2)
     faces = [_is_on_faces(h, axis, format, place) for h, axis in zip(headers, axes, strict=True)]
+    told = len(headers) == 1 and headers[0].metadata.value(UNITS_METADATA) == CELLS_PER_FRAME
+    if None in faces:
+        return resampled_velocity(headers, format, density, place, told=told)
+    x, *others = map(bool, faces)
+    y, z = others or (x, x)
     parts = [_around(header, density) for header in headers]
     if len(headers) == 1:
-        told = headers[0].metadata.value(UNITS_METADATA) == CELLS_PER_FRAME
-        return StoredVelocity(*parts[0], (faces[0], faces[0], faces[0]), told)
+        return StoredVelocity(*parts[0], (x, y, z), told)
     whole = parts[0][0].box
     bricks = sorted_bricks(np.concatenate([active.bricks for _, active in parts]))
     values = np.stack([part.blocks(bricks) for part, _ in parts], axis=-1)
     # A component that is zero everywhere may not be stored at all.
     stored = np.logical_or.reduce([active.blocks(bricks) for _, active in parts])
     return StoredVelocity(
-        Field(bricks, values, whole),
-        Field(bricks, stored, whole, outside=False),
-        (faces[0], faces[1], faces[2]),
-    )
-
-
-def _velocity_headers(file: VdbFile, format: SmokeFormat) -> list[GridHeader]:
-    """One vector grid, or three scalar grids in the order x, y, z, or none."""
-    if format.velocity_grid == NO_VELOCITY:
-        return []
-    for name in VELOCITY_NAMES if format.velocity_grid is None else (format.velocity_grid,):
-        if name in file.names and _components(file.grids[name]) == 3:
-            return [file.grids[name]]
-        parts = [f"{name}.{axis}" for axis in _AXES]
-        there = [part in file.names and _components(file.grids[part]) == 1 for part in parts]
-        if all(there):
-            return [file.grids[part] for part in parts]
-        if any(there):
-            missing = ", ".join(
-                part for part, is_there in zip(parts, there, strict=True) if not is_there
-            )
-            raise GridError(
-                f"{file.path}: velocity {name!r} lacks the scalar grid {missing}; "
-                "leave the velocity out with --velocity-grid none"
-            )
-    if format.velocity_grid is None:
-        return []
-    raise GridError(
-        f"{file.path}: no velocity {format.velocity_grid!r}; choose with --velocity-grid none or "
-        f"a grid of vectors from {_listed(file)}"
+        Field(bricks, values, whole), Field(bricks, stored, whole, outside=False), (x, y, z)
     )
 
 
 def _is_on_faces(
     header: GridHeader, axis: int | None, format: SmokeFormat, density: Transform
-) -> bool:
+) -> bool | None:
     """Whether velocity lies on lower faces; the grid of component `axis` may say so by its place.
 
-    Raises:
-        GridError: If the grid lies elsewhere than the density.
+    None if its cells are others than the density's.
     """
-    ours, theirs = density.index_to_world, header.transform.index_to_world
-    to_cells = np.linalg.inv(ours[:3, :3])
-    shift = to_cells @ (theirs[:3, 3] - ours[:3, 3])
+    to_ours = np.linalg.inv(density.index_to_world) @ header.transform.index_to_world
+    shift = to_ours[:3, 3]
     lower_face = np.zeros(3) if axis is None else -0.5 * np.eye(3)[axis]
-    is_same = np.allclose(to_cells @ theirs[:3, :3], np.eye(3), atol=_CELL_TOLERANCE)
+    is_same = np.allclose(to_ours[:3, :3], np.eye(3), atol=_CELL_TOLERANCE)
     is_shifted = axis is not None and np.allclose(shift, lower_face, atol=_CELL_TOLERANCE)
     if not is_same or not (is_shifted or np.allclose(shift, 0, atol=_CELL_TOLERANCE)):
-        raise GridError(
-            f"{header.source.path}: velocity grid {header.name!r} has another transform than the "
-            f"density: voxel size {_numbers(header.transform.voxel_size)} against "
-            f"{_numbers(density.voxel_size)}, shifted by {_numbers(shift)} cells; resample it"
-        )
+        return None
     if format.staggered is not None:
         return format.staggered
     return is_shifted or header.grid_class == "staggered"
@@ -192,7 +185,8 @@ def _around(header: GridHeader, density: Field) -> tuple[Field, Field]:
     if not there.is_empty and not box.is_empty and there.intersection(whole).is_empty:
         raise GridError(
             f"{header.source.path}: velocity grid {header.name!r} covers {_extent(there)}, the "
-            f"density {_extent(box)}: they do not meet"
+            f"density {_extent(box)}: they do not meet; leave the velocity out with "
+            "--velocity-grid none"
         )
     return _finite(header, grid, whole, near=bricks_beside(density.bricks))
 
@@ -209,21 +203,6 @@ def _finite(
     what = f"grid {header.name!r}"
     found = single_precision(values.values, header.source.path, what, stored=active.values)
     return replace(values, values=found), active
-
-
-def _components(header: GridHeader) -> int | None:
-    value_type = VALUE_TYPES.get(header.value_type)
-    return value_type.components if value_type else None
-
-
-def _listed(file: VdbFile) -> str:
-    """The grids of a file with their types."""
-    grids = (f"{name} ({header.value_type})" for name, header in file.grids.items())
-    return ", ".join(grids) or "no grid at all"
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return ", ".join(f"{value:g}" for value in values)
 
 
 def _extent(box: Box) -> str:

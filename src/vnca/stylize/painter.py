@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -11,7 +11,8 @@ from typing import Any, Literal, NamedTuple
 from vnca.errors import FileFormatError, GridError, OptionError, OutputError, ShapeError, VncaError
 from vnca.files import existing_file, remove_file, remove_leftovers
 from vnca.io.sequence import Frame, FrameSequence
-from vnca.io.smoke import SmokeFormat, read_smoke, write_painted
+from vnca.io.smoke import SmokeFormat, missing_velocity, read_smoke, write_painted
+from vnca.io.smoke_format import NO_VELOCITY
 from vnca.lattice import Lattice
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.roll import Roll, RollState
@@ -65,6 +66,7 @@ class Painter:
     conditions: Mapping[str, Any]
     tell: Callable[[str], None]
     refine: int = 1
+    _told: set[str] = field(default_factory=set, init=False)
 
     @property
     def unfinished_path(self) -> Path:
@@ -152,6 +154,7 @@ class Painter:
 
     def _write(self, frame: Frame, read: _Read, state: RollState) -> RollState:
         """Paint smoke to the file of a frame; the state after it."""
+        self._tell_without_velocity(read)
         painting = self.roll.paint(read.smoke, state)
         if frame == self.sequence[0]:
             # From here on, frames of an earlier painting are overwritten.
@@ -168,6 +171,19 @@ class Painter:
             refine=self.refine,
         )
         return painting.state
+
+    def _tell_without_velocity(self, read: _Read) -> None:
+        """Say once that the rule wants a velocity which a frame does not have."""
+        if (
+            self.roll.rule.config.velocity_prior
+            and self.smoke.velocity_grid != NO_VELOCITY
+            and read.smoke.velocity_field is None
+            and not read.smoke.box.is_empty
+            and "velocity" not in self._told
+        ):
+            self._told.add("velocity")
+            missing = missing_velocity(read.frame.path)
+            self.tell(f"{missing}; frames without are painted as if their smoke rested")
 
     def _read(self, at: int) -> _Read | VncaError:
         """A frame of the sequence, or what is wrong with it."""

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import torch
 
-from vnca.automaton.rule import Rule, Scales
+from vnca.automaton.rule import Rule, Scales, density_scale
 from vnca.features.flow import FlowNetwork
 from vnca.features.vgg import VGG16
 from vnca.io.orientation import on_lattice
@@ -13,7 +13,7 @@ from vnca.render.brightness import gamma_for_cell_opacity
 from vnca.training.config import TrainConfig
 from vnca.training.loop import Trainer
 from vnca.training.motion import MotionSupervision
-from vnca.training.smoke_scene import SmokeScene, density_scale, velocity_scale
+from vnca.training.smoke_scene import SmokeScene, velocity_scale
 from vnca.typing import FloatArray
 from vnca.volume import Volume
 

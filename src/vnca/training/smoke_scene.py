@@ -20,7 +20,7 @@ from vnca.render.velocity import projected_velocity
 from vnca.render.view import View, render
 from vnca.training.config import ViewConfig
 from vnca.training.scene import Scene
-from vnca.typing import AnyArray, Box, FloatArray
+from vnca.typing import Box, FloatArray
 from vnca.volume import Volume
 
 SPEEDS = (0.25, 1.5)
@@ -241,12 +241,6 @@ def smoke_bounds(smoke: Volume, density_scale: float) -> Box:
     x, y, z = (lower + smoke.origin).tolist()
     u, v, w = (upper + smoke.origin).tolist()
     return Box((x, y, z), (u, v, w))
-
-
-def density_scale(density: AnyArray) -> float:
-    """The density that counts as 1: the 99th percentile of what is not empty."""
-    smoke = density[density > 0]
-    return float(np.percentile(smoke, 99)) if len(smoke) else 1.0
 
 
 def velocity_scale(smoke: Volume) -> float:

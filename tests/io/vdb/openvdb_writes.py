@@ -121,3 +121,26 @@ save(
     sharing,
     metadata={"title": "Übung", "count": 7, "scale": 0.5, "where": (1, 2, 3)},
 )
+
+# Smoke in small cells, and a wind that is its place in the world, in large and turned ones.
+smoke = named("density", vdb.FloatGrid())
+smoke.transform = vdb.createLinearTransform(voxelSize=0.1)
+smoke.fill((0, 0, 0), (7, 7, 7), 1.0, True)
+large = vdb.createLinearTransform(voxelSize=0.25)
+large.rotate(0.3, vdb.Axis.Y)
+large.translate((0.3, 0.2, 0.1))
+cells = [(i, j, k) for i in range(-6, 7) for j in range(-6, 7) for k in range(-6, 7)]
+wind = named("Velocity", vdb.Vec3SGrid())
+parts = [named(f"Velocity{axis}", vdb.FloatGrid()) for axis in "XYZ"]
+for cell in cells:
+    place = large.indexToWorld(cell)
+    wind.getAccessor().setValueOn(cell, place)
+    for part, value in zip(parts, place, strict=True):
+        part.getAccessor().setValueOn(cell, value)
+for grid in (wind, *parts):
+    grid.transform = large
+save("wind", smoke, wind)
+bent = named("vel", wind.deepCopy())
+bent.transform = vdb.createFrustumTransform((0, 0, 0), (10, 10, 10), 0.5, 10.0)
+save("wind_bent", smoke, bent)
+save("wind_parts", smoke, *parts)

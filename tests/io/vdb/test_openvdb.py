@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from vnca.errors import GridError
+from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write, write_vdb
 from vnca.io.vdb.compression import Codec
 from vnca.io.vdb.layout import Compression, NodeCode
@@ -271,3 +272,21 @@ def test_the_frame_kept_with_the_tests_is_bit_identical_to_openvdb(
 ) -> None:
     write_vdb(tmp_path / "again.vdb", grids_by_name(real_frame))
     agree_on([real_frame, tmp_path / "again.vdb"], judge, assert_agrees)
+
+
+def test_velocity_in_a_frustum_is_named_with_the_way_out(written_by_openvdb: Path) -> None:
+    path = written_by_openvdb / "wind_bent.vdb"
+    with pytest.raises(GridError, match=r"grid 'vel' has a Non.*FrustumMap.* --velocity-grid none"):
+        read_smoke(path, SmokeFormat())
+    assert read_smoke(path, SmokeFormat(velocity_grid="none")).velocity is None
+
+
+@pytest.mark.parametrize("name", ["wind", "wind_parts"])
+def test_a_wind_in_large_turned_cells_of_openvdb_is_read_in_those_of_the_smoke(
+    name: str, written_by_openvdb: Path
+) -> None:
+    """OpenVDB says where its cells lie; there, the wind is the place itself."""
+    smoke = read_smoke(written_by_openvdb / f"{name}.vdb", SmokeFormat(velocity_units="m/s", fps=1))
+    assert smoke.voxel_size == pytest.approx((0.1, 0.1, 0.1))
+    places = 0.1 * np.stack(np.indices(smoke.density.shape), axis=-1)
+    np.testing.assert_allclose(smoke.velocity, places / 0.1, atol=1e-4)  # type: ignore[arg-type]

@@ -71,30 +71,53 @@ class Codec:
     def _read_batch(
         self, cursor: Cursor, active: BoolArray, values: AnyArray, is_leaf: bool
     ) -> None:
-        cells = active.shape[1]
         omits = Compression.ACTIVE_MASK in self.flags
         stored = active.copy() if omits else np.ones_like(active)
-        counts = stored.sum(axis=1).tolist()
-        masks = np.packbits(active, axis=1, bitorder="little") if is_leaf else active
         if omits:
             values[...] = self.background
         chunks = []
+        for node, (code, inactive, count) in enumerate(self._nodes(cursor, active, is_leaf)):
+            if inactive is not None and omits:
+                values[node] = inactive
+            if code == NodeCode.ALL_VALUES:
+                stored[node] = True
+            chunks.append(self._read_chunk(cursor, count))
+        packed = np.frombuffer(b"".join(chunks), self.value_type.stored_dtype(self.is_half))
+        with np.errstate(invalid="ignore"):  # not-a-numbers are data here
+            values[stored] = packed.reshape(-1, self.value_type.components)
+
+    def skip_leaves(self, cursor: Cursor, active: BoolArray) -> None:
+        """Move the cursor behind the leaves whose masks are `active`; nothing is unpacked.
+
+        Raises:
+            FileFormatError: If they are truncated or corrupt.
+        """
+        for start in range(0, len(active), _BATCH):
+            for _, _, count in self._nodes(cursor, active[start : start + _BATCH], is_leaf=True):
+                length, _ = self._chunk_length(cursor, self._stored_size(count))
+                cursor.seek(cursor.position + length)
+
+    def _nodes(
+        self, cursor: Cursor, active: BoolArray, is_leaf: bool
+    ) -> Iterator[tuple[int, AnyArray | None, int]]:
+        """Code, inactive values if the node has some, and how many values its chunk has.
+
+        Who asks for the next node has moved the cursor behind the chunk of the one before.
+        """
+        cells = active.shape[1]
+        omits = Compression.ACTIVE_MASK in self.flags
+        counts = active.sum(axis=1).tolist() if omits else [cells] * len(active)
+        masks = np.packbits(active, axis=1, bitorder="little") if is_leaf else active
         for node, count in enumerate(counts):
             if is_leaf and cursor.take(masks.shape[1]) != masks[node].tobytes():
                 raise cursor.error("corrupt: the two masks of a leaf differ")
             code = cursor.take(1)[0]
             if code > NodeCode.ALL_VALUES:
                 raise cursor.error(f"corrupt: node code {code}")
+            inactive = None
             if NodeCode.BACKGROUND < code < NodeCode.ALL_VALUES:
                 inactive = self._read_inactive_values(cursor, code, cells)
-                if omits:
-                    values[node] = inactive
-            if code == NodeCode.ALL_VALUES:
-                stored[node] = True
-            chunks.append(self._read_chunk(cursor, cells if code == NodeCode.ALL_VALUES else count))
-        packed = np.frombuffer(b"".join(chunks), self.value_type.stored_dtype(self.is_half))
-        with np.errstate(invalid="ignore"):  # not-a-numbers are data here
-            values[stored] = packed.reshape(-1, self.value_type.components)
+            yield code, inactive, cells if code == NodeCode.ALL_VALUES else count
 
     def _read_inactive_values(self, cursor: Cursor, code: int, cells: int) -> AnyArray:
         """What omitted cells hold, `[cell, component]` or `[component]`."""
@@ -107,20 +130,33 @@ class Codec:
             return off
         return np.where(bits_of(cursor.take(cells // 8))[:, None], on, off)
 
-    def _read_chunk(self, cursor: Cursor, count: int) -> bytes:
-        stored = self.value_type.stored_dtype(self.is_half)
-        size = count * self.value_type.components * stored.itemsize
+    def _stored_size(self, count: int) -> int:
+        """Bytes that `count` values take in the clear."""
+        return (
+            count * self.value_type.components * self.value_type.stored_dtype(self.is_half).itemsize
+        )
+
+    def _chunk_length(self, cursor: Cursor, size: int) -> tuple[int, bool]:
+        """Bytes of the chunk that follows, which holds `size`, and whether they are packed."""
         if not self.flags & (Compression.ZIP | Compression.BLOSC):
-            return cursor.take(size)
+            return size, False
         # OpenVDB writes no chunk at all where there is nothing to convert to half floats.
+        stored = self.value_type.stored_dtype(self.is_half)
         if size == 0 and stored != self.value_type.dtype and stored.kind == "f":
-            return b""
+            return 0, False
         length = cursor.unpack("q")
-        if length <= 0:
-            if -length != size:
-                raise cursor.error(f"corrupt: a chunk of {-length} bytes, expected {size}")
-            return cursor.take(size)
+        if length > 0:
+            return length, True
+        if -length != size:
+            raise cursor.error(f"corrupt: a chunk of {-length} bytes, expected {size}")
+        return size, False
+
+    def _read_chunk(self, cursor: Cursor, count: int) -> bytes:
+        size = self._stored_size(count)
+        length, is_packed = self._chunk_length(cursor, size)
         packed = cursor.take(length)
+        if not is_packed:
+            return packed
         if size == 0:
             return b""
         unpack = _unpack_blosc if Compression.BLOSC in self.flags else _unpack_zip

@@ -27,13 +27,17 @@ class VdbFile:
         path: The file.
         metadata: Of the file as a whole.
         grids: Headers by unique name, in the file's order.
+        unfound: How many grids the file has behind one whose end nothing tells.
     """
 
-    def __init__(self, source: Source, metadata: Metadata, grids: dict[str, GridHeader]) -> None:
+    def __init__(
+        self, source: Source, metadata: Metadata, grids: dict[str, GridHeader], unfound: int = 0
+    ) -> None:
         self._source = source
         self.path = source.path
         self.metadata = metadata
         self.grids: Mapping[str, GridHeader] = MappingProxyType(grids)
+        self.unfound = unfound
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -53,8 +57,14 @@ class VdbFile:
         for header in self.grids.values():
             if decoded(header.grid_name) == name:
                 return header
-        there = ", ".join(self.grids) or "no grid at all"
-        raise GridError(f"{self.path}: no grid {name!r}; the file has {there}")
+        raise GridError(f"{self.path}: no grid {name!r}; the file has {self.listed()}")
+
+    def listed(self) -> str:
+        """The grids with their types, for messages."""
+        grids = [f"{name} ({header.value_type})" for name, header in self.grids.items()]
+        if self.unfound:
+            grids.append(f"{self.unfound} more that cannot be found behind it, for want of offsets")
+        return ", ".join(grids) or "no grid at all"
 
     def read(self, name: str) -> Grid:
         """The grid of this name with its values.
@@ -92,7 +102,7 @@ def open_vdb(path: Path | str) -> VdbFile:
         cursor = Cursor(stream, 0, os.fstat(stream.fileno()).st_size, str(path))
         source = _read_file_header(cursor, path, stream)
         metadata = read_metadata(cursor)
-        return VdbFile(source, metadata, _read_headers(cursor, source))
+        return VdbFile(source, metadata, *_read_headers(cursor, source))
     except BaseException:
         stream.close()
         raise
@@ -107,19 +117,21 @@ def _read_file_header(cursor: Cursor, path: Path, stream: BinaryIO) -> Source:
             f"{path}: VDB files of version {version} are not supported, only {OLDEST_VERSION} to "
             f"{NEWEST_VERSION}; write it again with a current program"
         )
-    if not has_offsets:
-        raise FileFormatError(
-            f"{path}: the file was streamed and has no grid offsets; write it again to a file"
-        )
     cursor.take(36)  # a unique identifier, as text
-    return Source(path, stream, cursor.end, version, (major, minor))
+    return Source(path, stream, cursor.end, version, (major, minor), has_offsets)
 
 
-def _read_headers(cursor: Cursor, source: Source) -> dict[str, GridHeader]:
+def _read_headers(cursor: Cursor, source: Source) -> tuple[dict[str, GridHeader], int]:
+    """Headers by unique name, and how many more there are that cannot be found."""
     headers: dict[str, GridHeader] = {}
     numbers: dict[str, int] = {}
     parents: dict[bytes, GridHeader] = {}
-    for _ in range(cursor.unpack("I")):
-        unique_name, header = read_header(cursor, source, headers, numbers, parents)
+    count = cursor.unpack("I")
+    for behind in range(count - 1, -1, -1):
+        unique_name, header = read_header(
+            cursor, source, headers, numbers, parents, is_last=behind == 0
+        )
         headers[header.name] = parents[unique_name] = header
-    return headers
+        if header.end is None:
+            return headers, behind
+    return headers, 0

@@ -10,7 +10,7 @@ from vnca.bricks.field import Field, as_bricks
 from vnca.bricks.places import covered
 from vnca.errors import GridError
 from vnca.io.vdb.layout import LEAF_CELLS, LEAF_EDGE, VALUE_TYPES, ValueType
-from vnca.io.vdb.metadata import Metadata
+from vnca.io.vdb.metadata import NAMES_OF_TYPES, Metadata
 from vnca.io.vdb.transform import Transform
 from vnca.io.vdb.tree import Tiles, Tree
 from vnca.typing import AnyArray, BoolArray, Box, Index, IntArray
@@ -24,6 +24,8 @@ MOST_TILE_CELLS = 2**27
 class Described(Protocol):
     """What `Grid` and `GridHeader` have in common."""
 
+    @property
+    def value_type(self) -> str: ...  # noqa: D102
     @property
     def is_half(self) -> bool: ...  # noqa: D102
     @property
@@ -234,7 +236,8 @@ class Grid:
             values: `[x, y, z]`, or `[x, y, z, 3]` for vectors, of a type in `VALUE_TYPES`.
             active: `[x, y, z]`. Inactive cells become background.
             origin: Index coordinates of cell `[0, 0, 0]`.
-            like: Gives transform, metadata and half floats where they are not given here.
+            like: Gives transform, metadata and half floats where they are not given here. Metadata
+                that name another type of values are left out.
             transform: From index space to the world.
             metadata: Entries or Python values, added to those of `like`.
             background: Value outside.
@@ -286,6 +289,8 @@ class Grid:
                 raise GridError(f"grid {name!r}: needs a transform, or a grid to be like")
             transform = like.transform
         entries = like.metadata.without_statistics() if like is not None else Metadata()
+        if like is not None and like.value_type != value_type.name:
+            entries = entries.without(NAMES_OF_TYPES)
         entries.update(Metadata.of(metadata))
         if grid_class is not None:
             entries.update(Metadata.of({"class": grid_class}))

@@ -4,17 +4,24 @@ Reference: OpenVDB `io/GridDescriptor.cc`, `io/Archive.cc` (`readGrid`), `io/Fil
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO
 
 from vnca.errors import GridError
 from vnca.io.vdb.cursor import Cursor
 from vnca.io.vdb.grid import EMPTY_BOX, Grid
-from vnca.io.vdb.layout import HALF_SUFFIX, SUFFIX, TREE, VALUE_TYPES, Compression
+from vnca.io.vdb.layout import (
+    HALF_SUFFIX,
+    SUFFIX,
+    TREE,
+    VALUE_TYPES,
+    WRITTEN_VERSION,
+    Compression,
+)
 from vnca.io.vdb.metadata import Metadata, read_metadata
 from vnca.io.vdb.transform import Transform, read_transform
-from vnca.io.vdb.tree import read_tree
+from vnca.io.vdb.tree import locate_leaves, read_tree
 from vnca.typing import Box
 
 _TREE_NAME = "Tree_{}_" + "_".join(map(str, TREE))
@@ -30,6 +37,7 @@ class Source:
         size: Bytes in it.
         version: Of the file format.
         library: Major and minor version of the library that wrote it.
+        has_offsets: Whether it claims that its grids say where they begin and end.
     """
 
     path: Path
@@ -37,6 +45,7 @@ class Source:
     size: int
     version: int
     library: tuple[int, int]
+    has_offsets: bool
 
     def cursor(self, start: int, end: int, grid: str) -> Cursor:
         """A cursor over a part of the file that belongs to `grid`.
@@ -65,8 +74,8 @@ class GridHeader:
         source: The file.
         transform_start: Byte where the transform begins.
         tree_start: Byte where the tree begins; None behind a transform of unknown length.
-        blocks: Byte where the values of the leaves begin.
-        end: One past the grid's last byte.
+        blocks: Byte where the values of the leaves begin; None where the file does not tell.
+        end: One past the grid's last byte; None where nothing tells.
         parent: The grid whose tree this one shares.
     """
 
@@ -80,8 +89,8 @@ class GridHeader:
     source: Source = field(repr=False)
     transform_start: int
     tree_start: int | None
-    blocks: int
-    end: int
+    blocks: int | None
+    end: int | None
     linear_transform: Transform | None = field(repr=False)
     parent: "GridHeader | None" = None
 
@@ -101,7 +110,56 @@ class GridHeader:
     def stored_bytes(self) -> int:
         """Bytes of the file that its tree takes."""
         owner = self.parent or self
-        return owner.end - (owner.tree_start or owner.transform_start)
+        end = self.source.size if owner.end is None else owner.end
+        return end - (owner.tree_start or owner.transform_start)
+
+    @property
+    def is_readable(self) -> bool:
+        """Whether values of this kind can be read here; others are listed and copied."""
+        return (self.parent or self)._is_of_known_layout and self.linear_transform is not None
+
+    @property
+    def obstacle_to_copying(self) -> str | None:
+        """Why it cannot be copied to another file, if so; the words follow its name."""
+        owner = self.parent or self
+        version = self.source.version
+        if version < WRITTEN_VERSION and self.value_type not in VALUE_TYPES:
+            return (
+                f"is of type {self.value_type}: those are copied only from files of version "
+                f"{WRITTEN_VERSION} or newer, this one has {version}"
+            )
+        if owner.end is None or self.end is None:
+            return (
+                f"is of type {self.value_type} behind a {self.map_type}: in a file without offsets "
+                "where it ends is not known; write the file again, or without this grid"
+            )
+        if owner is not self and owner.tree_start is None:
+            return f"shares the tree of a grid with a {owner.map_type}"
+        return None
+
+    @property
+    def _is_of_known_layout(self) -> bool:
+        """Whether it can be told where its tree ends."""
+        is_known = self.value_type in VALUE_TYPES and self.compression <= _ALL_FLAGS
+        return is_known and self.tree_start is not None
+
+    def measured(self) -> "GridHeader":
+        """The same with the true `blocks` and `end`, where its tree is of a kind that is known.
+
+        Raises:
+            FileFormatError: If the tree is truncated or corrupt.
+            GridError: If the file has been closed.
+        """
+        if self.tree_start is None:
+            return self
+        if self.parent is not None:
+            return replace(self, end=self.tree_start)
+        if not self._is_of_known_layout:
+            return self
+        cursor = self.source.cursor(self.tree_start, self.source.size, self.name)
+        value_type = VALUE_TYPES[self.value_type]
+        blocks = locate_leaves(cursor, value_type, is_half=self.is_half, flags=self.compression)
+        return replace(self, blocks=blocks, end=cursor.position)
 
     @property
     def transform(self) -> Transform:
@@ -136,7 +194,8 @@ class GridHeader:
             GridError: If the file has been closed or the transform is not linear.
         """
         owner = self.parent or self
-        cursor = self.source.cursor(owner.tree_start or 0, owner.end, self.name)
+        end = self.source.size if owner.end is None else owner.end
+        cursor = self.source.cursor(owner.tree_start or 0, end, self.name)
         if (value_type := VALUE_TYPES.get(self.value_type)) is None:
             raise cursor.error(
                 f"cannot read values of type {self.value_type}, only {', '.join(VALUE_TYPES)}"
@@ -146,9 +205,9 @@ class GridHeader:
             raise cursor.error(f"its tree lies behind a {owner.map_type} of unknown length")
         if owner.compression > _ALL_FLAGS:
             raise cursor.error(f"unknown compression {int(owner.compression)}")
-        tree = read_tree(
-            cursor, owner.blocks, value_type, is_half=self.is_half, flags=owner.compression
-        )
+        tree = read_tree(cursor, value_type, is_half=self.is_half, flags=owner.compression)
+        if cursor.remaining:
+            raise cursor.error(f"corrupt: {cursor.remaining} bytes follow the last leaf")
         name = decoded(self.grid_name)
         return Grid(name, value_type.name, transform, tree, self.metadata, self.is_half)
 
@@ -162,8 +221,15 @@ def read_header(
     taken: Collection[str],
     numbers: dict[str, int],
     parents: Mapping[bytes, GridHeader],
+    *,
+    is_last: bool,
 ) -> tuple[bytes, GridHeader]:
     """The descriptor at the cursor and what it points to; the cursor moves to the next one.
+
+    The offsets of a descriptor are hints: streams have none, and writers differ in how many they
+    fill in. One that cannot be is not believed; the grid then begins behind its descriptor and
+    ends where its tree does. The end of the last grid, of which OpenVDB makes no use, is believed
+    where the file ends.
 
     Args:
         cursor: Over the whole file.
@@ -171,9 +237,11 @@ def read_header(
         taken: Names of the headers before this one.
         numbers: How often a name was wanted that was taken; kept between calls.
         parents: The headers before this one by the name their descriptor gives.
+        is_last: Whether no descriptor follows.
 
     Returns:
-        The name the descriptor gives, and the header.
+        The name the descriptor gives, and the header. Where its end is None, the cursor stays
+        inside the grid.
 
     Raises:
         FileFormatError: If the descriptor or what it points to is truncated or corrupt.
@@ -182,21 +250,17 @@ def read_header(
     name = _unused_name(unique_name, taken, numbers)
     start, blocks, end = cursor.unpack("3q")
     parent = None
-    if parent_name:
-        if (parent := parents.get(parent_name)) is None or parent.parent is not None:
-            raise cursor.error(f"grid {name!r} shares the tree of a grid that is not there")
-        blocks = end  # the descriptor of a grid without a tree leaves it open
-    if not cursor.position <= start <= blocks <= end <= cursor.end:
-        raise cursor.error(
-            f"truncated or corrupt: grid {name!r} claims bytes {start} to {end} of {cursor.end}"
-        )
-    body = source.cursor(start, blocks, name)
+    if parent_name and ((parent := parents.get(parent_name)) is None or parent.parent is not None):
+        raise cursor.error(f"grid {name!r} shares the tree of a grid that is not there")
+    has_start = source.has_offsets and cursor.position <= start <= cursor.end
+    has_end = has_start and start < end <= cursor.end
+    body = source.cursor(
+        start if has_start else cursor.position, end if has_end else cursor.end, name
+    )
     compression = Compression(body.unpack("I"))
     metadata = read_metadata(body)
     transform_start = body.position
-    map_type, transform = read_transform(body)
-    tree_start = body.position if transform is not None else None
-    cursor.seek(end)
+    map_type, transform, is_known_map = read_transform(body)
     half_suffix = HALF_SUFFIX.encode()
     header = GridHeader(
         name=name,
@@ -208,14 +272,24 @@ def read_header(
         map_type=map_type,
         source=source,
         transform_start=transform_start,
-        tree_start=tree_start,
-        blocks=blocks,
-        end=end,
+        tree_start=body.position if is_known_map else None,
+        blocks=blocks if has_end and body.position < blocks <= end else None,
+        end=end if has_end else None,
         linear_transform=transform,
         parent=parent,
     )
     if parent and (parent.type_name, parent.is_half) != (header.type_name, header.is_half):
         raise cursor.error(f"corrupt: grid {name!r} shares a tree of another type")
+    if header.end is None or (is_last and header.end < cursor.end):
+        header = header.measured()
+    if header.end is None and source.has_offsets:
+        raise cursor.error(
+            f"truncated or corrupt: grid {name!r} claims bytes {start} to {end} of {cursor.end}"
+        )
+    if header.end is None and is_last:
+        header = replace(header, end=cursor.end)
+    if header.end is not None:
+        cursor.seek(header.end)
     return unique_name, header
 
 

@@ -4,7 +4,7 @@ Reference: OpenVDB `MetaMap.cc`, `Metadata.h`.
 """
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,7 +102,11 @@ class Metadata(dict[str, Entry]):
         The index for delayed loading (`file_delayed_load`) describes one encoding of the tree:
         a stale one makes OpenVDB read rubbish.
         """
-        return Metadata((name, entry) for name, entry in self.items() if name not in STATISTICS)
+        return self.without(STATISTICS)
+
+    def without(self, names: Collection[str]) -> "Metadata":
+        """A copy less the entries of these names."""
+        return Metadata((name, entry) for name, entry in self.items() if name not in names)
 
     def encode(self) -> bytes:
         """The bytes of a file, entries in their order here."""
@@ -124,6 +128,8 @@ STATISTICS = (
     "file_mem_bytes",
     "file_voxel_count",
 )
+# In which programs note the type of a grid's values, besides the tree's own; Houdini the second.
+NAMES_OF_TYPES = ("grid_type", "value_type")
 
 
 def read_metadata(cursor: Cursor) -> Metadata:

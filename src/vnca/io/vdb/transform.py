@@ -24,6 +24,8 @@ _DOUBLES = {
     "UnitaryMap": 16,
 }
 LINEAR_MAPS = frozenset(_DOUBLES)
+# The one map that is not linear: a box, taper and depth, and behind them a linear map.
+_FRUSTUM, _FRUSTUM_DOUBLES = "NonlinearFrustumMap", 8
 # Numbers from here to its inverse can be inverted and squared in double precision.
 _LARGEST = 1e30
 
@@ -105,18 +107,30 @@ def _is_usable(matrix: AnyArray) -> bool:
     return bool(log_volume >= -3 * np.log(_LARGEST))
 
 
-def read_transform(cursor: Cursor) -> tuple[str, Transform | None]:
-    """The name of the map at the cursor, and the map if it is linear.
+def read_transform(cursor: Cursor) -> tuple[str, Transform | None, bool]:
+    """The map at the cursor: its name, the map itself if it is linear, and whether it is known.
 
-    The cursor moves past a linear map; it stays inside others, whose length is unknown here.
+    The cursor moves past a known map; it stays inside others, whose length nobody can tell.
 
     Raises:
         FileFormatError: If a linear map is truncated, not invertible or of absurd size.
+
+    Reference: `math/Maps.h`, `read`.
     """
-    map_type = cursor.string().decode("utf-8", "backslashreplace")
+    map_type = _map_type(cursor)
+    if map_type == _FRUSTUM:
+        cursor.take(8 * _FRUSTUM_DOUBLES)
+        inner = _map_type(cursor)
+        if inner in LINEAR_MAPS:
+            cursor.take(8 * _DOUBLES[inner])
+        return map_type, None, inner in LINEAR_MAPS
     if map_type not in LINEAR_MAPS:
-        return map_type, None
+        return map_type, None, False
     transform = Transform(map_type, cursor.unpack(f"{_DOUBLES[map_type]}d"))
     if not _is_usable(transform.index_to_world):
         raise cursor.error(f"corrupt: its {map_type} is not invertible, or of absurd size")
-    return map_type, transform
+    return map_type, transform, True
+
+
+def _map_type(cursor: Cursor) -> str:
+    return cursor.string().decode("utf-8", "backslashreplace")

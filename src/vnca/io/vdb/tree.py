@@ -102,6 +102,11 @@ class _Topology:
                 self.leaf_origins.append(leaf_origins)
                 self.leaf_masks.append(cursor.take(len(leaf_origins) * LEAF_CELLS // 8))
 
+    def leaves(self) -> tuple[IntArray, BoolArray]:
+        """Lowest cell of each leaf `[n, 3]`, and which of its cells are active `[n, 512]`."""
+        active = bits_of(b"".join(self.leaf_masks)).reshape(-1, LEAF_CELLS)
+        return np.concatenate(self.leaf_origins), active
+
     def _check_root_origins(self, origins: AnyArray) -> None:
         if (origins % UPPER_EDGE).any():
             raise self.cursor.error("corrupt: a node below the root is not on a multiple of 4096")
@@ -126,14 +131,11 @@ class _Topology:
             self.tiles.append(Tiles(origins, edges, self.codec.value_type.shaped(values), active))
 
 
-def read_tree(
-    cursor: Cursor, blocks: int, value_type: ValueType, *, is_half: bool, flags: Compression
-) -> Tree:
-    """The tree at the cursor, which must end where the cursor's range does.
+def read_tree(cursor: Cursor, value_type: ValueType, *, is_half: bool, flags: Compression) -> Tree:
+    """The tree at the cursor; the cursor moves behind it.
 
     Args:
         cursor: At the first byte of the tree.
-        blocks: Where the values of the leaves begin, as the grid's descriptor says.
         value_type: Type of the values.
         is_half: Whether floating-point values are stored as half floats.
         flags: How values are packed.
@@ -141,25 +143,45 @@ def read_tree(
     Raises:
         FileFormatError: If the tree is truncated or corrupt.
     """
+    topology = _read_topology(cursor, value_type, is_half, flags)
+    codec = topology.codec
+    origins, active = topology.leaves()
+    if value_type.name == "bool":
+        values = _read_bool_leaves(cursor, origins, active)
+    else:
+        values = codec.read_values(cursor, active, is_leaf=True)
+    tiles = Tiles(*(np.concatenate(parts) for parts in zip(*topology.tiles, strict=True)))
+    return Tree(
+        value_type.shaped(codec.background), origins, active, value_type.shaped(values), tiles
+    )
+
+
+def locate_leaves(
+    cursor: Cursor, value_type: ValueType, *, is_half: bool, flags: Compression
+) -> int:
+    """Where the values of the leaves begin; the cursor moves behind the tree.
+
+    The arguments and errors are those of `read_tree`; values of leaves are not unpacked.
+    """
+    topology = _read_topology(cursor, value_type, is_half, flags)
+    origins, active = topology.leaves()
+    begin = cursor.position
+    if value_type.name == "bool":
+        _read_bool_leaves(cursor, origins, active)
+    else:
+        topology.codec.skip_leaves(cursor, active)
+    return begin
+
+
+def _read_topology(
+    cursor: Cursor, value_type: ValueType, is_half: bool, flags: Compression
+) -> _Topology:
     if (buffers := cursor.unpack("i")) != 1:
         raise cursor.error(f"corrupt: a tree of {buffers} buffers, expected 1")
     codec = Codec(value_type, is_half, flags, read_value(cursor, value_type))
     topology = _Topology(cursor, codec)
     topology.read_root()
-    if cursor.position != blocks:
-        raise cursor.error(f"corrupt: the tree's values should begin at byte {blocks}")
-    origins = np.concatenate(topology.leaf_origins)
-    active = bits_of(b"".join(topology.leaf_masks)).reshape(-1, LEAF_CELLS)
-    if value_type.name == "bool":
-        values = _read_bool_leaves(cursor, origins, active)
-    else:
-        values = codec.read_values(cursor, active, is_leaf=True)
-    if cursor.remaining:
-        raise cursor.error(f"corrupt: {cursor.remaining} bytes follow the last leaf")
-    tiles = Tiles(*(np.concatenate(parts) for parts in zip(*topology.tiles, strict=True)))
-    return Tree(
-        value_type.shaped(codec.background), origins, active, value_type.shaped(values), tiles
-    )
+    return topology
 
 
 BOOL_LEAF = np.dtype(

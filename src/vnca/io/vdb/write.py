@@ -22,7 +22,6 @@ from vnca.io.vdb.layout import (
     MAGIC,
     SUFFIX,
     TREE,
-    VALUE_TYPES,
     WRITTEN_LIBRARY,
     WRITTEN_VERSION,
     Compression,
@@ -159,22 +158,22 @@ def _copied(header: GridHeader, name: bytes) -> _Part:
     """The grid of another file. A grid that shares a tree gets a copy of its own."""
     owner = header.parent or header
     label = f"{header.source.path}: grid {header.name!r}"
-    if header.source.version < WRITTEN_VERSION and header.value_type not in VALUE_TYPES:
-        raise GridError(
-            f"{label}: grids of type {header.value_type} are copied only from files of version "
-            f"{WRITTEN_VERSION} or newer, this one has {header.source.version}"
-        )
-    if header is not owner and owner.tree_start is None:
-        raise GridError(f"{label} shares the tree of a grid with a {owner.map_type}")
+    if (obstacle := header.obstacle_to_copying) is not None:
+        raise GridError(f"{label} {obstacle}")
+    assert owner.end is not None
+    assert header.end is not None
+    blocks = owner.blocks or owner.measured().blocks or owner.end
     metadata = header.metadata
     if header.source.library < _INDEX_LIBRARY:
         metadata = Metadata(metadata)
         metadata.pop("file_delayed_load", None)
     head = struct.pack("<I", owner.compression) + metadata.encode()
-    transform_and_tree = [
-        (header.transform_start, header.blocks),
-        *([(owner.tree_start or 0, owner.blocks)] if header is not owner else []),
-    ]
+    transform_and_tree = [(header.transform_start, blocks)]
+    if header is not owner:
+        transform_and_tree = [
+            (header.transform_start, header.end),
+            (owner.tree_start or 0, blocks),
+        ]
 
     def before() -> Iterator[bytes]:
         yield head
@@ -185,7 +184,7 @@ def _copied(header: GridHeader, name: bytes) -> _Part:
         name,
         header.type_name + HALF_SUFFIX * header.is_half,
         before(),
-        _bytes_of(header, owner.blocks, owner.end),
+        _bytes_of(header, blocks, owner.end),
     )
 
 

@@ -1,0 +1,107 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vnca.errors import GridError
+from vnca.io.smoke_format import SmokeFormat
+from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
+from vnca.io.vdb_grids import listed_vectors, velocity_headers
+
+
+def saved(folder: Path, *names: str) -> Path:
+    """A file of grids; a name that ends in `!` is one of vectors."""
+    active = np.ones((2, 2, 2), np.bool_)
+    write_vdb(
+        folder / "s.vdb",
+        [
+            Grid.from_dense(
+                name.removesuffix("!"),
+                np.ones((2, 2, 2, 3) if name.endswith("!") else (2, 2, 2), np.float32),
+                active,
+                (0, 0, 0),
+                transform=Transform.uniform(1),
+            )
+            for name in ("density", *names)
+        ],
+    )
+    return folder / "s.vdb"
+
+
+def found(path: Path, velocity_grid: str | None = None) -> list[str]:
+    with open_vdb(path) as file:
+        return [h.name for h in velocity_headers(file, SmokeFormat(velocity_grid=velocity_grid))]
+
+
+def three(shared: str, axes: str = "xyz") -> list[str]:
+    return [shared + axis for axis in axes]
+
+
+@pytest.mark.parametrize("name", ["velocity", "vel", "v"])
+def test_velocity_is_found_in_any_case_and_with_any_separator(tmp_path: Path, name: str) -> None:
+    for spelt in (name, name.capitalize(), name.upper()):
+        assert found(saved(tmp_path, f"{spelt}!", "Cd!")) == [spelt]
+        for separator in (".", "_", ""):
+            for axes in ("xyz", "XYZ"):
+                parts = three(spelt + separator, axes)
+                assert found(saved(tmp_path, *reversed(parts), "fuel")) == parts
+
+
+def test_exact_names_come_first_in_their_order(tmp_path: Path) -> None:
+    assert found(saved(tmp_path, "Velocity!", "vel_x", "vel_y", "vel_z", "v!")) == ["v"]
+    assert found(saved(tmp_path, "v!", "vel!", "velocity!")) == ["velocity"]
+    assert found(saved(tmp_path, "Velocity!", *three("vel."))) == three("vel.")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("Velocity!", *three("vel_")),
+        ("Velocity!", "Vel!"),
+        (*three("vel_"), *three("v")),
+        (*three("vel"), *three("vel", "XYZ")),
+    ],
+)
+def test_of_two_that_could_be_it_both_are_named_and_either_can_be_chosen(
+    tmp_path: Path, names: tuple[str, ...]
+) -> None:
+    path = saved(tmp_path, *names)
+    choices = [name.removesuffix("!") for name in names if name[-1] in "!xX"]
+    assert len(choices) == 2
+    with pytest.raises(GridError, match=f"choose with --velocity-grid from {', '.join(choices)}$"):
+        found(path)
+    for choice in choices:
+        assert found(path, choice)[0] == choice
+
+
+def test_a_name_that_is_asked_for_may_be_any(tmp_path: Path) -> None:
+    path = saved(tmp_path, "wind!", *three("Gust_", "XYZ"), "velocity!")
+    assert found(path, "wind") == found(path, "Wind") == ["wind"]
+    assert found(path, "gust") == found(path, "Gust_X") == three("Gust_", "XYZ")
+    assert found(path, "none") == []
+    with pytest.raises(GridError, match=r"no velocity 'breeze'; choose .* wind \(vec3s\)"):
+        found(path, "breeze")
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (("vel_x", "vel_z"), "velocity 'vel' lacks the scalar grid vel_y; leave"),
+        (("VelocityY",), "velocity 'Velocity' lacks the scalar grid VelocityX, VelocityZ"),
+        (("vel.x", "vel.y", "vel.z!"), r"lacks the scalar grid vel\.z"),
+    ],
+)
+def test_a_component_that_is_missing_is_named(
+    tmp_path: Path, names: tuple[str, ...], words: str
+) -> None:
+    with pytest.raises(GridError, match=words):
+        found(saved(tmp_path, *names))
+
+
+def test_other_grids_are_no_velocity_but_are_listed(tmp_path: Path) -> None:
+    path = saved(tmp_path, "Cd!", *three("wind."), "fuel", "axis_x", "x", "y", "z")
+    assert found(path) == []
+    with open_vdb(path) as file:
+        assert listed_vectors(file) == "Cd (vec3s), wind.x with wind.y and wind.z"
+    with open_vdb(saved(tmp_path, "heat")) as file:
+        assert listed_vectors(file) == ""
