@@ -14,9 +14,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vnca.bricks.field import Field
-from vnca.bricks.places import CELLS, EDGE, sorted_bricks
+from vnca.bricks.places import CELLS, EDGE, bricks_reached
 from vnca.errors import GridError
-from vnca.typing import AnyArray, Box, FloatArray, Index, IntArray
+from vnca.typing import AnyArray, Box, FloatArray, Index
 
 Beyond = Literal["nothing", "nearest"]
 """What there is beyond the cells of an array: nothing, or what its nearest cell holds."""
@@ -233,7 +233,13 @@ class Placement:
 
     def _interpolated(self, field: Field, over: Box, beyond: Beyond) -> Field:
         # A cell has a share in those whose centres are less than one cell away.
-        bricks = self._bricks_over(field, over, 1 if beyond == "nothing" else 2)
+        margin, most = 1 if beyond == "nothing" else 2, MOST_CELLS // CELLS
+        bricks = bricks_reached(field.bricks, self.matrix, over, margin=margin, most=most)
+        if bricks is None:
+            raise GridError(
+                f"{self.what}: takes more than {MOST_CELLS} cubic cells as small as the shortest "
+                "side of the sequence's voxels; resample it to more even voxels"
+            )
         values = np.empty((len(bricks), CELLS, *field.values.shape[4:]), np.float32)
         back = np.linalg.inv(self.matrix)
         parts = [(np.arange(count) + 0.5) / count - 0.5 for count in self._parts]
@@ -248,28 +254,6 @@ class Placement:
             values[slab] = (total / len(places)).reshape(-1, *values.shape[1:])
         values = values.reshape(-1, *field.values.shape[1:])
         return replace(field, bricks=bricks, values=values, box=over).within(over)
-
-    def _bricks_over(self, field: Field, over: Box, margin: int) -> IntArray:
-        """Bricks of the other grid, in a box, that those of a field and cells beside reach into."""
-        ends = field.bricks[:, None] * EDGE + np.array(
-            list(product((-margin - 0.5, EDGE - 0.5 + margin), repeat=3))
-        )
-        corners = _at(ends, self.matrix)
-        # Where a mean is taken, half a cell more.
-        first = np.maximum(np.floor(corners.min(axis=1) - 0.5), over.lower) // EDGE
-        last = np.minimum(np.ceil(corners.max(axis=1) + 0.5), np.array(over.upper) - 1) // EDGE
-        counts = np.maximum(last - first + 1, 0)
-        # Bricks that lie beside each other reach into some of the same.
-        if counts.prod(axis=1).sum() * CELLS <= 8 * MOST_CELLS:
-            steps = product(*map(range, counts.max(axis=0, initial=0).astype(int)))
-            found = [first[(counts > step).all(axis=1)] + step for step in steps]
-            bricks = sorted_bricks(np.concatenate([np.empty((0, 3)), *found]))
-            if len(bricks) * CELLS <= MOST_CELLS:
-                return bricks
-        raise GridError(
-            f"{self.what}: takes more than {MOST_CELLS} cubic cells as small as the shortest side "
-            "of the sequence's voxels; resample it to more even voxels"
-        )
 
 
 def require_right_angles(index_to_world: AnyArray, what: str) -> None:

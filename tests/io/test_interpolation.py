@@ -2,11 +2,21 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.io.interpolation import interpolated
-from vnca.typing import AnyArray, FloatArray
+from vnca.bricks.field import Field
+from vnca.io import interpolation
+from vnca.typing import AnyArray, BoolArray, FloatArray
 
 SHAPE = (4, 3, 5)
 EVERYWHERE = np.ones(SHAPE, np.bool_)
+
+
+def interpolated(
+    values: FloatArray, known: BoolArray, places: AnyArray
+) -> tuple[FloatArray, BoolArray]:
+    """In an array whose first cell is (-3, 4, 30)."""
+    origin = (-3, 4, 30)
+    fields = Field.from_dense(values, origin), Field.from_dense(known, origin)
+    return interpolation.interpolated(*fields, places + origin)
 
 
 def linear(places: AnyArray) -> FloatArray:

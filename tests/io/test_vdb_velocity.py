@@ -257,7 +257,7 @@ def countless(_: AnyArray) -> list[Grid]:
         (far, "velocity grid 'vel' has no value near the smoke.*--velocity-grid none"),
         (different, r"grids 'vel\.x' and 'vel\.z' differ in their voxels.*--velocity-grid none"),
         (spoiled, "grid 'vel': 1 of .* values are NaN"),
-        (countless, r"grid 'vel\.x' has \d+ × \d+ × \d+ cells where the smoke is.*-grid none"),
+        (countless, r"grid 'vel\.x' has more cells where the smoke is than \d+.*-grid none"),
     ],
 )
 def test_what_cannot_be_resampled_is_one_line_that_names_the_way_out(

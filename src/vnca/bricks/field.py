@@ -109,12 +109,19 @@ class Field:
         values[rows == len(self.bricks)] = self.outside
         return values
 
+    def find(self, cells: IntArray) -> AnyArray:
+        """Where cells `[n, 3]` stand in the values laid out flat: `[n]`, one by one.
+
+        Where there is no brick, in one more that would follow the last.
+        """
+        return _flat_places(self.places, *runs_of_bricks(cells), cells)
+
     def gather(self, cells: IntArray) -> AnyArray:
         """The values `[n, ...]` at any cells `[n, 3]`."""
         kind = self.values.shape[4:]
         if not len(self.bricks):
             return np.full((len(cells), *kind), self.outside, self.values.dtype)
-        at = _flat_places(self.places, *runs_of_bricks(cells), cells)
+        at = self.find(cells)
         values = self.values.reshape(-1, *kind).take(at, axis=0, mode="clip")
         values[at >= len(self.bricks) * CELLS] = self.outside
         return values
@@ -178,6 +185,11 @@ class Field:
         if kept.all():
             return self
         return replace(self, bricks=self.bricks[kept], values=self.values[kept])
+
+    def union(self, other: "Field") -> "Field":
+        """Of two fields of booleans in one box: where either holds."""
+        bricks = sorted_bricks(np.concatenate([self.bricks, other.bricks]))
+        return replace(self, bricks=bricks, values=self.blocks(bricks) | other.blocks(bricks))
 
     def turned(self, order: Sequence[int], signs: Sequence[int] = (1, 1, 1)) -> "Field":
         """With other axes: axis `a` of the result is axis `order[a]` of this one.
@@ -268,7 +280,7 @@ def _aligned(corner: Index, up: bool) -> Index:
 
 
 def _flat_places(places: Places, runs: AnyArray, lengths: AnyArray, cells: AnyArray) -> AnyArray:
-    """Where cells lie in values laid out flat; behind the last where there is no brick."""
+    """Where cells lie in values laid out flat; in one brick more where there is none."""
     at = np.repeat(places.find(runs) * CELLS, lengths)
     at += places_in_bricks(cells)
     return at

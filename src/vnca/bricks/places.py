@@ -5,6 +5,7 @@ own coordinates are those divided by 8. The leaves of OpenVDB are the same cubes
 """
 
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -51,6 +52,35 @@ def bricks_beside(bricks: IntArray, rings: int = 1) -> IntArray:
         shifts = [bricks + shift * step for shift in range(-rings, rings + 1)]
         bricks = sorted_bricks(np.concatenate(shifts))
     return bricks
+
+
+def bricks_reached(
+    bricks: IntArray, matrix: AnyArray, box: Box, *, margin: float, most: int
+) -> IntArray | None:
+    """Bricks of another grid, in a box there, that some bricks and the cells around reach into.
+
+    Args:
+        bricks: `[m, 3]` of the one grid.
+        matrix: 4×4, from its index coordinates to the other's.
+        box: Cells of the other.
+        margin: How many cells around each brick count, and half a cell more in the other.
+        most: How many bricks there may be.
+
+    Returns:
+        Their coordinates `[n, 3]`, sorted; None if there are more.
+    """
+    ends = np.array(list(product((-margin - 0.5, EDGE - 0.5 + margin), repeat=3)))
+    corners = (bricks[:, None] * EDGE + ends) @ matrix[:3, :3].T + matrix[:3, 3]
+    first = np.maximum(np.floor(corners.min(axis=1) - 0.5), box.lower) // EDGE
+    last = np.minimum(np.ceil(corners.max(axis=1) + 0.5), np.array(box.upper) - 1) // EDGE
+    counts = np.maximum(last - first + 1, 0)
+    # Bricks that lie beside each other reach into some of the same.
+    if counts.prod(axis=1).sum() > 8 * most:
+        return None
+    steps = product(*map(range, counts.max(axis=0, initial=0).astype(int)))
+    found = [first[(counts > step).all(axis=1)] + step for step in steps]
+    reached = sorted_bricks(np.concatenate([np.empty((0, 3)), *found]))
+    return reached if len(reached) <= most else None
 
 
 def runs_of_bricks(cells: AnyArray) -> tuple[AnyArray, AnyArray]:

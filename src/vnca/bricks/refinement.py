@@ -9,7 +9,7 @@ import numpy as np
 from vnca.bricks.field import Field
 from vnca.bricks.growth import dilated
 from vnca.bricks.places import EDGE, covered
-from vnca.typing import AnyArray
+from vnca.typing import AnyArray, IntArray
 
 _VALUES_AT_ONCE = 2**22
 
@@ -25,7 +25,7 @@ def refined(field: Field, factor: int) -> Field:
     box = field.box.refined(factor)
     finer = [
         replace(field, bricks=bricks, values=values, box=box).within(box).trimmed()
-        for bricks, values in _divided(coarse, factor)
+        for bricks, values in _finer_bricks(coarse, factor)
     ]
     if not finer:
         return replace(field, box=box)
@@ -34,39 +34,35 @@ def refined(field: Field, factor: int) -> Field:
     return replace(field, bricks=bricks, values=values, box=box).in_order()
 
 
-def replicated(field: Field, factor: int) -> Field:
-    """A field on a grid `factor` times as fine; a cell has the value of the one that it is in."""
+def divided(field: Field, factor: int) -> Field:
+    """A field on a grid `factor` times as fine: all parts of a cell hold what it held."""
     values = field.values
-    for axis in (1, 2, 3):
+    for axis in range(1, 4):
         values = values.repeat(factor, axis)
-    parts = _bricks_of(values)
-    offsets = np.array(list(product(range(factor), repeat=3)), np.int32)
-    bricks = (field.bricks[:, None] * np.int32(factor) + offsets).reshape(-1, 3)
-    return replace(field, bricks=bricks, values=parts, box=field.box.refined(factor)).in_order()
+    bricks, values = _cut(field.bricks, values, factor)
+    return replace(field, bricks=bricks, values=values, box=field.box.refined(factor)).in_order()
 
 
-def _bricks_of(values: AnyArray) -> AnyArray:
-    """Cubes `[m, 8f, 8f, 8f, ...]` as the bricks in them, `[m f³, 8, 8, 8, ...]`, z fastest."""
-    edge, kind = values.shape[1] // EDGE, values.shape[4:]
-    split = values.reshape(-1, edge, EDGE, edge, EDGE, edge, EDGE, *kind)
-    order = (0, 1, 3, 5, 2, 4, 6, *range(7, split.ndim))
-    return split.transpose(order).reshape(-1, EDGE, EDGE, EDGE, *kind)
-
-
-def _divided(field: Field, factor: int) -> Iterator[tuple[AnyArray, AnyArray]]:
+def _finer_bricks(field: Field, factor: int) -> Iterator[tuple[AnyArray, AnyArray]]:
     """The finer bricks in some of the bricks at a time, and their values."""
     kind = field.values.shape[4:]
     count = max(1, _VALUES_AT_ONCE // int(np.prod((*kind, (EDGE * factor) ** 3))))
-    parts = np.array(list(product(range(factor), repeat=3)), np.int32)
     around = _continued(field)
     for start in range(0, len(around), count):
         values = around[start : start + count]
         for axis in range(1, 4):
             values = _interpolated(values, axis, factor)
-        blocks = values.reshape(-1, *(factor, EDGE) * 3, *kind)
-        blocks = blocks.transpose(0, 1, 3, 5, 2, 4, 6, *range(7, blocks.ndim))
-        bricks = field.bricks[start : start + count, None] * np.int32(factor) + parts
-        yield bricks.reshape(-1, 3), blocks.reshape(-1, EDGE, EDGE, EDGE, *kind)
+        yield _cut(field.bricks[start : start + count], values, factor)
+
+
+def _cut(bricks: IntArray, values: AnyArray, factor: int) -> tuple[AnyArray, AnyArray]:
+    """Finer bricks, and their values, of those of larger ones, `[m, 8 f, 8 f, 8 f, ...]`."""
+    kind = values.shape[4:]
+    parts = np.array(list(product(range(factor), repeat=3)), np.int32)
+    blocks = values.reshape(-1, *(factor, EDGE) * 3, *kind)
+    blocks = blocks.transpose(0, 1, 3, 5, 2, 4, 6, *range(7, blocks.ndim))
+    finer = bricks[:, None] * np.int32(factor) + parts
+    return finer.reshape(-1, 3), blocks.reshape(-1, EDGE, EDGE, EDGE, *kind)
 
 
 def _continued(field: Field) -> AnyArray:

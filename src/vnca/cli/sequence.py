@@ -132,7 +132,7 @@ def require_dense_enough(sequence: FrameSequence, smoke: SmokeFormat, scale: flo
     most, typical, is_read = 0.0, 0.0, False
     for frame in sequence:
         try:
-            density = read_smoke(frame.path, smoke).density
+            density = read_smoke(frame.path, smoke).density_field.values
         except BROKEN:
             continue
         is_read = True

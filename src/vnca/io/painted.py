@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vnca.bricks.field import Field
-from vnca.bricks.places import sorted_bricks
-from vnca.bricks.refinement import replicated
+from vnca.bricks.refinement import divided
 from vnca.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.io.npz import read_npz_smoke
 from vnca.io.orientation import UpAxis, on_lattice, own_cells, upright_world
@@ -208,14 +207,9 @@ class _Painting:
         """Which cells to store; `of_file` are active in the file."""
         if self.refine == 1:
             return of_file
-        painted = replace(density, values=density.values != 0, outside=False)
-        if not background:
-            return painted.trimmed()
+        dense = replace(density, values=density.values != 0, outside=False).trimmed()
         # A cell that is not stored would not be empty.
-        finer = replicated(of_file, self.refine)
-        bricks = sorted_bricks(np.concatenate([painted.bricks, finer.bricks]))
-        either = painted.blocks(bricks) | finer.blocks(bricks)
-        return Field(bricks, either, painted.box, outside=False).trimmed()
+        return dense.union(divided(of_file, self.refine)) if background else dense
 
     def transform(self, of_file: Transform) -> Transform:
         """That of the painted cells; `of_file` is that of the file's."""
@@ -246,8 +240,8 @@ def _paint_vdb(
         header, old, cells = read_density(file, format)
         what = f"{source}: grid {header.name!r}"
         before, active = old.fields(cells)
-        background = old.tree.background
         density, colour = frame.in_file(old.transform, before, what)
+        background = old.tree.background
         active = frame.active(density, active, background)
         transform = frame.transform(old.transform)
         dtype = VALUE_TYPES[old.value_type].dtype

@@ -41,9 +41,8 @@ def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
     """
     with open_vdb(path) as file:
         if not file.grids:
-            return StoredSmoke(
-                Field.from_dense(np.zeros((0, 0, 0), np.float32), (0, 0, 0)), np.eye(4), None
-            )
+            nothing = Field.from_dense(np.zeros((0, 0, 0), np.float32), (0, 0, 0))
+            return StoredSmoke(nothing, np.eye(4), None)
         header, grid, box = read_density(file, format)
         density, _ = _finite(header, grid, box)
         return StoredSmoke(

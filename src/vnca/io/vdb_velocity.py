@@ -2,20 +2,21 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
 from vnca.bricks.field import Field
-from vnca.bricks.places import EDGE, bricks_beside
+from vnca.bricks.places import CELLS, EDGE, bricks_beside, bricks_reached, sorted_bricks
 from vnca.errors import GridError
 from vnca.io.interpolation import interpolated
 from vnca.io.smoke_format import SmokeFormat, StoredVelocity, single_precision, upper_grown
 from vnca.io.vdb import GridHeader, Transform
-from vnca.typing import AnyArray, BoolArray, Box, FloatArray, IntArray
+from vnca.io.vdb.grid import MOST_TILE_CELLS
+from vnca.typing import AnyArray, Box
 
-_MOST_CELLS = 2**27  # as an array, 1.5 GB of vectors
-_AT_ONCE = 2**18  # places that are looked at together
+_BRICKS_AT_ONCE = 128
 _TOLERANCE = 1e-6
 
 
@@ -36,7 +37,7 @@ def resampled_velocity(
     Args:
         headers: One grid of vectors, or those of the components x, y and z.
         format: Whether velocity is staggered, unless the grids are to say.
-        density: The smoke.
+        density: The density.
         place: Where its cells lie.
         told: Whether the file says that velocity is in cells per frame.
 
@@ -57,35 +58,31 @@ def resampled_velocity(
                 "--velocity-grid none"
             )
     faces = [0.5 * _is_staggered(h, format, is_apart) * np.eye(3) for h in headers]
-    whole = upper_grown(density.box)
-    bricks = bricks_beside(density.bricks)
-    cells = _cells_of(bricks)
     if len(headers) == 3:
-        parts = [_at_centres(h, cells, place, faces[a][a]) for a, h in enumerate(headers)]
-        values = np.concatenate([part for part, _ in parts], axis=-1)
+        parts = [_at_centres(h, density, place, faces[a][a]) for a, h in enumerate(headers)]
         # A component that is zero everywhere may not be stored at all.
-        stored = np.logical_or.reduce([known for _, known in parts])
+        combined = np.logical_or
     elif faces[0].any():
-        parts = [_at_centres(headers[0], cells, place, face) for face in faces[0]]
-        values = np.stack([part[..., axis] for axis, (part, _) in enumerate(parts)], axis=-1)
-        stored = np.logical_and.reduce([known for _, known in parts])
+        parts = [_at_centres(headers[0], density, place, face) for face in faces[0]]
+        parts = [
+            (replace(part, values=part.values[..., axis, None]), known)
+            for axis, (part, known) in enumerate(parts)
+        ]
+        combined = np.logical_and
     else:
-        values, stored = _at_centres(headers[0], cells, place, np.zeros(3))
+        parts, combined = [_at_centres(headers[0], density, place, np.zeros(3))], np.logical_or
+    bricks = sorted_bricks(np.concatenate([known.bricks for _, known in parts]))
+    values = np.concatenate([part.blocks(bricks) for part, _ in parts], axis=-1)
+    stored = combined.reduce([known.blocks(bricks) for _, known in parts])
+    whole = upper_grown(density.box)
     to_ours = np.linalg.solve(place.index_to_world[:3, :3], first[:3, :3])
-    shape = (len(bricks), EDGE, EDGE, EDGE)
     return StoredVelocity(
-        Field(bricks, values.reshape(*shape, 3), whole).within(whole),
-        Field(bricks, stored.reshape(shape), whole, outside=False).within(whole),
+        Field(bricks, values, whole),
+        Field(bricks, stored, whole, outside=False),
         (False, False, False),
         told,
         to_ours,
     )
-
-
-def _cells_of(bricks: IntArray) -> IntArray:
-    """All cells `[512 m, 3]` of bricks `[m, 3]`, brick by brick, z fastest."""
-    inside = np.indices((EDGE, EDGE, EDGE), np.int32).reshape(3, -1).T
-    return (bricks[:, None] * np.int32(EDGE) + inside).reshape(-1, 3)
 
 
 def _is_staggered(header: GridHeader, format: SmokeFormat, is_apart: bool) -> bool:
@@ -95,46 +92,64 @@ def _is_staggered(header: GridHeader, format: SmokeFormat, is_apart: bool) -> bo
 
 
 def _at_centres(
-    header: GridHeader, cells: IntArray, density: Transform, shift: AnyArray
-) -> tuple[FloatArray, BoolArray]:
-    """Values `[n, c]` of a grid at the centres of the density's cells, and where it has any.
+    header: GridHeader, density: Field, place: Transform, shift: AnyArray
+) -> tuple[Field, Field]:
+    """Values `[..., c]` of a grid at the centres of the density's cells, and where it has any.
 
-    `shift` is where the values lie below the centres of the grid's own cells.
+    They have one layer of cells more than the density at upper ends. `shift` is where the values
+    lie below the centres of the grid's own cells.
 
     Raises:
         FileFormatError: If it is truncated or corrupt.
         GridError: If it has values, but none near those cells, too many, or bad ones.
     """
     label = f"{header.source.path}: velocity grid {header.name!r}"
-    to_its = np.linalg.solve(header.transform.index_to_world, density.index_to_world)
+    to_its = np.linalg.solve(header.transform.index_to_world, place.index_to_world)
     to_its[:3, 3] += shift
-    grid = header.read()
+    box, grid = upper_grown(density.box), header.read()
     there = grid.active_box()
-    components = grid.tree.leaf_values.shape[2:] or (1,)
-    values, known = np.zeros((len(cells), *components), np.float32), np.zeros(len(cells), np.bool_)
-    if there.is_empty or not len(cells):
-        return values, known
+    kind = grid.tree.leaf_values.shape[2:] or (1,)
     # With a layer of cells around that have no value, for places beyond the last that have one.
-    part = _needed(cells, to_its).intersection(there.grown(1))
-    if math.prod(part.shape) > _MOST_CELLS:
+    part = _needed(box, to_its).intersection(there.grown(1))
+    if there.is_empty or density.box.is_empty:
+        return _nothing(box, kind)
+    beside, most = bricks_beside(density.bricks), MOST_TILE_CELLS // CELLS
+    near = bricks_reached(beside, to_its, part, margin=1, most=most)
+    if near is None:
         raise GridError(
-            f"{label} has {' × '.join(map(str, part.shape))} cells where the smoke is, of "
-            f"{_MOST_CELLS} at most; resample it, or leave it out with --velocity-grid none"
+            f"{label} has more cells where the smoke is than {MOST_TILE_CELLS}; resample it, or "
+            "leave it out with --velocity-grid none"
         )
-    if not part.is_empty:
-        stored, active = grid.to_dense(part, fill=0)
-        stored = single_precision(stored, header.source.path, f"grid {header.name!r}")
-        stored = stored.reshape(*active.shape, *components)
-        for start in range(0, len(cells), _AT_ONCE):
-            some = slice(start, start + _AT_ONCE)
-            at = cells[some] @ to_its[:3, :3].T + (to_its[:3, 3] - part.lower)
-            values[some], known[some] = interpolated(stored, active, at)
-    if not known.any():
+    stored, active = grid.fields(part, near=near)
+    what = f"grid {header.name!r}"
+    found = single_precision(stored.values, header.source.path, what, stored=active.values)
+    stored = replace(stored, values=found.reshape(*found.shape[:4], *kind))
+    back = np.linalg.inv(to_its)
+    bricks = bricks_reached(active.bricks, back, box, margin=1, most=most)
+    if bricks is None:
+        bricks = beside
+    values = np.zeros((len(bricks), CELLS, *kind), np.float32)
+    known = np.zeros((len(bricks), CELLS), np.bool_)
+    cells = np.array(list(product(range(EDGE), repeat=3)))
+    for start in range(0, len(bricks), _BRICKS_AT_ONCE):
+        slab = slice(start, start + _BRICKS_AT_ONCE)
+        at = (bricks[slab, None] * EDGE + cells).reshape(-1, 3)
+        found, is_known = interpolated(stored, active, at @ to_its[:3, :3].T + to_its[:3, 3])
+        values[slab], known[slab] = found.reshape(values[slab].shape), is_known.reshape(-1, CELLS)
+    shape = (-1, EDGE, EDGE, EDGE)
+    where = Field(bricks, known.reshape(shape), box, outside=False).within(box)
+    if not where.values.any():
         raise GridError(
             f"{label} has no value near the smoke: they do not meet; leave the velocity out with "
             "--velocity-grid none"
         )
-    return values, known
+    return Field(bricks, values.reshape(*shape, *kind), box).within(box), where
+
+
+def _nothing(box: Box, kind: tuple[int, ...]) -> tuple[Field, Field]:
+    bricks, shape = np.empty((0, 3), np.int32), (0, EDGE, EDGE, EDGE)
+    values = Field(bricks, np.empty((*shape, *kind), np.float32), box)
+    return values, Field(bricks, np.empty(shape, np.bool_), box, outside=False)
 
 
 def _needed(cells: IntArray, to_its: AnyArray) -> Box:

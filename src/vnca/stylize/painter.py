@@ -181,7 +181,7 @@ class Painter:
         if (
             self.roll.rule.config.velocity_prior
             and self.smoke.velocity_grid != NO_VELOCITY
-            and read.smoke.velocity is None
+            and read.smoke.velocity_field is None
             and not read.smoke.box.is_empty
             and "velocity" not in self._told
         ):

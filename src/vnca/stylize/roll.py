@@ -148,11 +148,14 @@ class Roll:
         A frame without smoke passes through. The painting starts afresh after it, unless cells
         live in the whole box.
         """
+        return self._shown(smoke, self._stepped(smoke, state))
+
+    def _stepped(self, smoke: Volume, state: RollState) -> RollState:
+        """The state after the steps of a frame."""
         rule, config = self.rule, self.config
         domain = self._domain(smoke)
         if len(domain) == 0:
-            state = RollState.empty(rule.config.channels, state.steps_done)
-            return Painting.of_fields(smoke, smoke.density_field, _unpainted(smoke), state)
+            return RollState.empty(rule.config.channels, state.steps_done)
         steps = self.steps_per_frame
         if len(state.cells) == 0:
             values, steps = domain.seed(rule.config.channels), config.warmup + steps
@@ -168,7 +171,7 @@ class Roll:
                 probability=rule.config.update_probability,
             )
             values = self.step(values, rows, domain.neighbours, told)
-        return self._shown(smoke, RollState(domain.cells, values, done))
+        return RollState(domain.cells, values, done)
 
     def _shown(self, smoke: Volume, state: RollState) -> Painting:
         """The frame as a state shows it."""
@@ -228,8 +231,3 @@ def stylize(
         painting = roll.paint(smoke.refined(refine), state)
         state = painting.state
         yield painting
-
-
-def _unpainted(smoke: Volume) -> Field:
-    nothing = np.empty((0, 3), np.int32), np.empty((0, 3), np.float32)
-    return Field.from_cells(*nothing, smoke.box, outside=UNPAINTED)
