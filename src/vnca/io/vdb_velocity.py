@@ -152,9 +152,9 @@ def _nothing(box: Box, kind: tuple[int, ...]) -> tuple[Field, Field]:
     return values, Field(bricks, np.empty(shape, np.bool_), box, outside=False)
 
 
-def _needed(cells: IntArray, to_its: AnyArray) -> Box:
+def _needed(box: Box, to_its: AnyArray) -> Box:
     """The cells of a grid around the centres of another's, given 4×4 from those to its indices."""
-    x, y, z = zip(cells.min(axis=0).tolist(), cells.max(axis=0).tolist(), strict=True)
+    x, y, z = ((low, high - 1) for low, high in zip(box.lower, box.upper, strict=True))
     corners = np.array(list(product(x, y, z, (1,)))) @ to_its[:3].T
     a, b, c = (math.floor(low) for low in corners.min(axis=0))
     i, j, k = (math.ceil(high) + 1 for high in corners.max(axis=0))
