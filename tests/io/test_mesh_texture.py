@@ -229,6 +229,12 @@ def test_a_picture_that_cannot_be_read_is_said(
         base_colours(read_mesh(path))
 
 
+def test_a_texture_without_a_picture_is_damage(plain: Path) -> None:
+    path = pictured(plain, lambda glb: glb.document.update(textures=[{"extensions": {"X": {}}}]))
+    with pytest.raises(FileFormatError, match="damaged"):
+        base_colours(read_mesh(path))
+
+
 def test_uvs_go_where_the_transform_of_a_texture_puts_them(plain: Path) -> None:
     transform = {"offset": [0.25, 0.5], "rotation": np.pi / 2, "scale": [0.5, 2]}
 

@@ -71,6 +71,34 @@ def test_corners_on_a_straight_side_change_nothing() -> None:
         np.testing.assert_allclose(np.abs(normals(rolled, cut(rolled))[:, 2]).sum(), 2.5)
 
 
+def comb(teeth: int) -> AnyArray:
+    """Anticlockwise, of area 1.5 a tooth; no point sees all of it."""
+    up = [[[x + 1, 1], [x + 1, 2], [x, 2], [x, 1]] for x in range(2 * (teeth - 1), -1, -2)]
+    return np.insert(np.concatenate([[[0, 0], [2 * teeth - 1, 0]], *up]), 2, 0.0, axis=1)
+
+
+@pytest.mark.parametrize("first", [0, 1, 5, 9, 12])
+def test_a_polygon_that_no_corner_sees_all_of_is_covered(first: int) -> None:
+    ring = np.roll(comb(6).astype(float), first, axis=0)
+    found = normals(ring, cut(ring))
+    np.testing.assert_allclose(found[:, 2].sum(), 11 + 6)
+    assert (found[:, 2] >= 0).all()
+
+
+@pytest.mark.parametrize("first", range(0, 26, 5))
+def test_no_corner_is_left_out_even_if_the_plane_does_not_show_it(first: int) -> None:
+    ring = comb(6).astype(float)
+    ring = np.insert(ring, 2, [[11, 0.5, 0]], axis=0)
+    ring = np.insert(ring, 1, [[3, 0, 0], [5, 0, 0]], axis=0)
+    flat = np.roll(ring, first, axis=0)
+    bent = np.roll(ring + np.outer(ring[:, 0] == 5, [0, 0, 0.4]), first, axis=0)
+    for each in (flat, bent):
+        triangles = cut(each)
+        assert set(triangles.ravel()) == set(range(len(ring)))
+        assert len(triangles) == len(ring) - 2
+        np.testing.assert_allclose(normals(each, triangles)[:, 2].sum(), 17)
+
+
 def test_a_bent_polygon_keeps_its_corners() -> None:
     ring = DART + np.outer([0.1, -0.1, 0.1, 0, -0.1], [0, 0, 1])
     triangles = cut(ring)
@@ -113,8 +141,10 @@ def test_corners_that_are_not_there_are_refused() -> None:
             triangulated(DART, np.array([4]), np.array([0, 1, 2, corner]))
 
 
-def test_only_concave_polygons_need_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_polygons_that_no_corner_sees_need_the_library(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(sys.modules, "mapbox_earcut", None)
-    assert len(cut(DART[[0, 1, 2, 4]])) == 2
+    assert len(cut(DART)) == 3
     with pytest.raises(BackendUnavailableError, match=r"vnca\[texture\]"):
-        cut(DART)
+        cut(comb(6))

@@ -188,7 +188,7 @@ def _base_colour(glb: Glb, surface: Surface, pictures: dict[int, FloatArray]) ->
     entry = glb.item("textures", texture["index"])
     # Extensions name pictures of other formats, which may stand beside a usual one.
     sources = [entry, *entry.get("extensions", {}).values()]
-    source = next(each["source"] for each in sources if "source" in each)
+    source = next((each for each in sources if "source" in each), entry)["source"]
     if source not in pictures:
         pictures[source] = _decoded(glb, glb.picture(source))
     sampler = glb.item("samplers", entry["sampler"]) if "sampler" in entry else {}
