@@ -117,7 +117,9 @@ def lying(smoke: Volume, way: int) -> Volume:
     order = [(2, 0, 1), (1, 0, 2)][way]
     density = smoke.density.transpose(order)[:, ::-1]
     assert smoke.velocity is not None
-    velocity = smoke.velocity.transpose(*order, 3)[:, ::-1][..., order] * np.float32([1, -1, 1])
+    velocity = smoke.velocity.transpose(*order, 3)[:, ::-1][..., order] * np.array(
+        [1, -1, 1], np.float32
+    )
     turn = np.eye(4)[:, (*order, 3)]
     turn[:, 1] *= -1
     matrix = smoke.index_to_world @ turn
