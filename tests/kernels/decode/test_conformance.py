@@ -268,43 +268,6 @@ def test_parts_lie_where_a_finer_grid_has_its_cells(factor: int) -> None:
     np.testing.assert_allclose(at, expected, atol=1e-6)
 
 
-def one_sine(values: AnyArray) -> Problem:
-    """Four of the values a point, through a network that sees nothing but their sines.
-
-    The other two layers are so small that their sines are themselves.
-    """
-    small = 2.0**-13
-    state = np.zeros((len(values) // 4 + 1, 8), np.float32)
-    state[:-1, 4:] = values.reshape(-1, 4)
-    points = len(state) - 1
-    rows = np.full((8, points), points, np.int32)
-    rows[0] = np.arange(points)
-    unit = np.eye(4, dtype=np.float32)
-    none = np.zeros(4, np.float32)
-    first = np.concatenate([0 * unit, unit], axis=1)
-    weights = Weights(first, none, small * unit, none, unit, none, unit / small, none)
-    gradient = np.ones((points, 4), np.float32)
-    return Problem(state, rows, np.zeros((points, 3), np.float32), weights, gradient)
-
-
-@needs_native
-@pytest.mark.parametrize("backend", KERNELS)
-@pytest.mark.parametrize("reach", [1.0, 3.2, 30.0, 1e3, 9.9e4, 1e30])
-def test_sines_and_cosines_are_off_by_no_more_than_the_readme_says(
-    backend: str, reach: float
-) -> None:
-    random = np.random.default_rng(0)
-    quarters = np.round(random.uniform(-reach, reach, 2000) / (np.pi / 2)) * (np.pi / 2)
-    values = np.concatenate([random.uniform(-reach, reach, 18_000), quarters]).astype(np.float32)
-    p = one_sine(values)
-    sine = p.forward(instructions=backend).ravel()
-    cosine = p.backward(instructions=backend)[0][:-1, 4:].ravel()
-    exact = values.astype(np.float64)
-    # Beside the sine itself, the small layers round twice more.
-    assert np.abs(sine - np.sin(exact)).max() < 2.5e-7
-    assert np.abs(cosine - np.cos(exact)).max() < 3.5e-7
-
-
 @needs_native
 @pytest.mark.parametrize("backend", KERNELS)
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

@@ -3,8 +3,8 @@
 // vectors are the compiler's own, as wide as the flags of the target allow.
 //
 // Everything here is local to the file that includes it, and no function of the standard library is
-// called but memcpy: an inline function compiled for AVX-512 must never be the one that the linker
-// keeps.
+// called but memcpy, sin and cos: an inline function compiled for AVX-512 must never be the one that
+// the linker keeps.
 #pragma once
 
 #include <cstddef>
