@@ -355,7 +355,8 @@ def test_flat_voxels_that_take_too_many_cubes_are_refused(
     needles = np.diag([0.0001, 0.0001, 100.0, 1.0])
     write_smoke(path, dataclasses.replace(tiny_smoke, index_to_world=needles))
     complaint = vnca("stylize", model, path, "--out", out).complaint
-    assert f"{path}: grid 'density': takes 10 × 10 × 10999999 cubic cells" in complaint
+    assert f"{path}: grid 'density': takes " in complaint
+    assert "cubic cells as small as the shortest side of the sequence's voxels" in complaint
 
 
 def test_a_rule_with_positions_paints_elsewhere_with_those_of_the_sequence_and_says_so(
