@@ -1,3 +1,4 @@
+from collections.abc import Sequence
 from itertools import permutations, product
 
 import numpy as np
@@ -19,7 +20,7 @@ steps = st.tuples(*[st.integers(-200, 200)] * 3)
 BOX = Box((-3, 2, 5), (4, 6, 14))
 
 
-def matrix(linear: AnyArray, centre: AnyArray | Index = (0, 0, 0)) -> AnyArray:
+def matrix(linear: AnyArray, centre: Sequence[float] = (0, 0, 0)) -> AnyArray:
     result = np.eye(4)
     result[:3, :3], result[:3, 3] = linear, centre
     return result
@@ -193,7 +194,9 @@ def test_what_is_beyond_the_array_is_nothing_or_its_nearest_cell() -> None:
 
 def test_vectors_are_turned_and_scaled_with_their_cells() -> None:
     place = Placement.between(matrix(0.5 * rotation(90)), matrix(0.25 * rotation(0)), BOX, "it")
-    np.testing.assert_allclose(place.vectors(np.float32([[1, 2, 3]])), [[-4, 2, 6]], atol=1e-6)
+    np.testing.assert_allclose(
+        place.vectors(np.array([[1, 2, 3]], np.float32)), [[-4, 2, 6]], atol=1e-6
+    )
 
 
 def test_nothing_stays_nothing() -> None:
