@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
     from vnca.io.vdb import open_vdb, write_vdb
     from vnca.io.video import FilmWriter
+    from vnca.lattice import Lattice
     from vnca.render.view import View
     from vnca.render.view import render as render_view
     from vnca.simulate.scenes import simulate as simulate_smoke
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Box": "typing",
     "FilmWriter": "io.video",
+    "Lattice": "lattice",
     "Model": "automaton.model",
     "Orthographic": "camera",
     "PRESETS": "training.config",
@@ -76,6 +78,7 @@ __all__ = [
     "VGG16",
     "Box",
     "FilmWriter",
+    "Lattice",
     "Model",
     "Orthographic",
     "Painting",

@@ -7,7 +7,6 @@ exchanged, mirrored and shifted by whole cells, interpolated where not.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import permutations, product
 from typing import Literal, NamedTuple
@@ -331,22 +330,32 @@ def _index(numbers: AnyArray) -> Index:
 
 def _between_centres(values: FloatArray, at: AnyArray, beyond: Beyond) -> FloatArray:
     """Values at places `[n, 3]`, counted in cells from the first centre, linear in between."""
-    last = np.array(values.shape[:3]) - 1
-    if beyond == "nearest":
-        at = np.clip(at, 0, last)
-    below = np.floor(at)
-    part = at - below
+    shape = values.shape[:3]
+    flat = values.reshape(-1, *values.shape[3:])
+    ends = [
+        _shares(at[:, axis], cells, beyond, stride)
+        for axis, (cells, stride) in enumerate(
+            zip(shape, (shape[1] * shape[2], shape[2], 1), strict=True)
+        )
+    ]
     total = np.zeros((len(at), *values.shape[3:]), np.float32)
-    for corner, weight in _weighted(part):
-        cell = below + corner
-        weight = weight * ((cell >= 0) & (cell <= last)).all(axis=1)
-        where = np.clip(cell, 0, last).astype(np.intp)
-        share = weight.astype(np.float32).reshape(-1, *[1] * (values.ndim - 3))
-        total += share * values[tuple(where.T)]
+    for (x, along_x), (y, along_y), (z, along_z) in product(*ends):
+        share = (along_x * along_y * along_z).reshape(-1, *[1] * (values.ndim - 3))
+        total += share * flat.take(x + y + z, axis=0)
     return total
 
 
-def _weighted(part: AnyArray) -> Iterator[tuple[AnyArray, AnyArray]]:
-    """The eight corners around a place, and the share of each, `[n]`."""
-    for corner in product((0, 1), repeat=3):
-        yield np.array(corner), np.where(corner, part, 1 - part).prod(axis=1)
+def _shares(
+    at: AnyArray, cells: int, beyond: Beyond, stride: int
+) -> list[tuple[AnyArray, FloatArray]]:
+    """Of the two centres beside each place `[n]` along an axis: where they are, and their share."""
+    if beyond == "nearest":
+        at = np.clip(at, 0, cells - 1)
+    below = np.floor(at)
+    part = at - below
+    found = []
+    for cell, share in ((below, 1 - part), (below + 1, part)):
+        share = share * ((cell >= 0) & (cell < cells))
+        place = np.clip(cell, 0, cells - 1).astype(np.intp) * stride
+        found.append((place, share.astype(np.float32)))
+    return found

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import math
 import struct
@@ -16,7 +17,8 @@ from vnca.automaton.model import MODEL_NAME, Model, from_record
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import FileFormatError, ModelError, OptionError, OutputError, ShapeError
 from vnca.io.smoke_format import SmokeFormat
-from vnca.typing import AnyArray
+from vnca.lattice import Lattice, Region
+from vnca.typing import AnyArray, Box
 
 
 @pytest.fixture
@@ -55,6 +57,49 @@ def test_a_model_comes_back_as_it_was_saved(model: Model, tmp_path: Path) -> Non
     assert back.training == model.training
     assert back.style is not None
     np.testing.assert_array_equal(back.style, model.style)
+
+
+def test_a_model_tells_where_it_was_trained_and_older_ones_need_not(
+    model: Model, tmp_path: Path
+) -> None:
+    to_world = np.array([[0.1, 0, 0, 1 / 3], [0, 0.1, 0, -7], [0, 0, 0.1, 0], [0, 0, 0, 1.0]])
+    place = Region(Lattice(to_world), Box((-4, 0, 2), (5, 9, 30)))
+    path = tmp_path / MODEL_NAME
+    dataclasses.replace(model, rule=dataclasses.replace(model.rule, place=place)).save(path)
+    back = Model.load(path).rule.place
+    assert back is not None
+    assert back.box == place.box
+    np.testing.assert_array_equal(back.lattice.to_world, to_world)
+    rewritten(path, place=None)
+    assert Model.load(path).rule.place is None
+
+
+PLACE = {"lattice_to_world": np.eye(4).tolist(), "box": [[0, 0, 0], [2, 3, 4]]}
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        3,
+        {"box": [[0, 0, 0], [2, 3, 4]]},
+        {**PLACE, "lattice_to_world": np.eye(3).tolist()},
+        {**PLACE, "lattice_to_world": np.diag([1, 0, 1, 1]).tolist()},
+        {**PLACE, "lattice_to_world": np.diag([1, 1e300, 1, 1]).tolist()},
+        {**PLACE, "lattice_to_world": np.diag([1, np.nan, 1, 1]).tolist()},
+        {**PLACE, "lattice_to_world": np.diag([1, 1, 1, 2]).tolist()},
+        {**PLACE, "lattice_to_world": [[1], [2, 3]]},
+        {**PLACE, "box": [[0, 0, 0], [2, 0, 4]]},
+        {**PLACE, "box": [[0, 0, 0], [2, 1.5, 4]]},
+        {**PLACE, "box": [[0, 0], [2, 1]]},
+        {**PLACE, "box": [[0, 0, 0], [2, 1, 10**30]]},
+    ],
+)
+def test_a_place_that_is_nowhere_is_damage(model: Model, tmp_path: Path, place: Any) -> None:
+    path = tmp_path / MODEL_NAME
+    model.save(path)
+    rewritten(path, place=place)
+    with pytest.raises(ModelError, match="damaged"):
+        Model.load(path)
 
 
 def test_saving_twice_gives_the_same_bytes(model: Model, tmp_path: Path) -> None:

@@ -30,6 +30,7 @@ __all__ = [
     "SmokeFormat",
     "read_smoke",
     "smoke_box",
+    "smoke_extent",
     "with_fitted_scale",
     "write_painted",
     "write_smoke",
