@@ -196,6 +196,15 @@ def test_uneven_voxels_show_the_body_as_it_is_in_the_world(vnca: Vnca, tmp_path:
     assert np.abs(cubes[..., 3].any(1).sum() - seen[..., 3].any(1).sum()) <= 2
 
 
+@pytest.mark.parametrize("size", [1e-12, 1e9])
+def test_a_world_of_any_size_shows_the_same(vnca: Vnca, tmp_path: Path, size: float) -> None:
+    upright = picture(vnca, write(tmp_path / "plain", shape(), UPRIGHT), *ANGLES)
+    matrix = np.diag([size] * 3 + [1.0])
+    matrix[:3, 3] = 1e4 * size
+    seen = picture(vnca, write(tmp_path / "other", shape(), matrix), *ANGLES)
+    np.testing.assert_allclose(seen, upright, atol=2 / 255)
+
+
 def test_frames_whose_origin_moves_stand_still(vnca: Vnca, tmp_path: Path) -> None:
     """As their transforms say: the film is the same as that of frames that do not move."""
     films = []

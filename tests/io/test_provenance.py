@@ -41,6 +41,14 @@ def test_a_painting_tells_what_was_told_of_it(smoke: Path, tmp_path: Path) -> No
     assert read_provenance(tmp_path / "smoke.npz") is None
 
 
+def test_names_that_are_no_text_and_long_seeds_are_told_too(smoke: Path, tmp_path: Path) -> None:
+    strange = Provenance(1.0, 1.0, "z", {"style": "caf\udce9.png", "seed": 2**70})
+    paint(smoke, tmp_path / "painted.vdb", strange)
+    told = read_provenance(tmp_path / "painted.vdb")
+    assert told is not None
+    assert told.facts == {"style": "caf\\udce9.png", "seed": str(2**70)}
+
+
 def test_another_gamma_changes_the_extinction_in_proportion() -> None:
     assert PAINTED.seen_with(None) == 2.5
     assert PAINTED.seen_with(1.5) == 5

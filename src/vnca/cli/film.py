@@ -155,7 +155,11 @@ def picture(
 
     from vnca.render.view import render
 
-    lower, upper = (corner.tolist() for corner in bounds)
+    density, colour, place = frame.smoke.density, frame.colour, frame.smoke.cells_to_world
+    # In lengths of a cell, single precision has room for a world of any size.
+    thinnest = _thinnest(place)
+    place = np.diag([1 / thinnest] * 3 + [1.0]) @ place
+    lower, upper = ((corner / thinnest).tolist() for corner in bounds)
     camera = frame_box(
         lower,
         upper,
@@ -164,7 +168,6 @@ def picture(
         aspect=config.columns / config.rows,
         field_of_view=config.field_of_view or None,
     )
-    density, colour, place = frame.smoke.density, frame.colour, frame.smoke.cells_to_world
     if density.size == 0:
         density, colour = np.zeros((1, 1, 1), np.float32), np.zeros((1, 1, 1, 3), np.float32)
     with torch.no_grad():
@@ -174,8 +177,8 @@ def picture(
             camera,
             rows=config.rows,
             columns=config.columns,
-            gamma=frame.extinction,
-            step=config.step * _thinnest(place),
+            gamma=frame.extinction * thinnest,
+            step=config.step,
             cells_to_world=place,
         )
 

@@ -45,7 +45,7 @@ class Provenance:
             "up_axis": self.up_axis,
             **self.facts,
         }
-        return Metadata.of({PREFIX + name: value for name, value in values.items()})
+        return Metadata.of({PREFIX + name: _storable(value) for name, value in values.items()})
 
 
 def without_provenance(metadata: Mapping[str, Any]) -> Metadata:
@@ -74,6 +74,15 @@ def read_provenance(path: Path) -> Provenance | None:
     if up_axis not in _UP_AXES:
         raise _damaged(path, "up_axis", up_axis)
     return Provenance(numbers[0], numbers[1], up_axis, told)
+
+
+def _storable(value: str | int | float) -> str | int | float:
+    """A value as a file can hold it: names of files need not be text, and a seed may be long."""
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        return str(value)
+    if isinstance(value, str):
+        return value.encode("utf-8", "backslashreplace").decode()
+    return value
 
 
 def _positive(path: Path, name: str, value: object) -> float:
