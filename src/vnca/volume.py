@@ -13,7 +13,7 @@ from vnca.errors import ShapeError
 from vnca.typing import AnyArray, Box, FloatArray, Index
 
 
-@dense("density", "velocity")
+@dense("density", "velocity", what=lambda smoke: f"frame {smoke.frame}")
 @dataclass(frozen=True, eq=False)
 class Volume:
     """Density and velocity on a grid, up along +z.

@@ -12,7 +12,7 @@ from vnca.automaton.domain import Domain
 from vnca.kernels.update.mask import changing_rows, hash_cells
 from vnca.kernels.update.reference import Weights, update
 from vnca.kernels.update.stencil import OFFSETS, stencil
-from vnca.typing import Box
+from vnca.typing import AnyArray, Box
 
 CHANNELS, HIDDEN, PRIORS = 4, 6, 3
 
@@ -35,6 +35,11 @@ def dense_step(grid: Tensor, priors: Tensor, alive: Tensor, chosen: Tensor, w: W
     return grid + (alive & chosen)[..., None] * (hidden @ w.output.T)
 
 
+def listed(dense: AnyArray, domain: Domain) -> AnyArray:
+    """Values `[n, ...]` at the cells of a domain, of an array that begins where its box does."""
+    return dense[tuple((domain.cells - np.asarray(domain.box.lower)).T)]
+
+
 @pytest.mark.parametrize("shape", [(1, 1, 1), (5, 4, 3), (9, 17, 8)])
 @pytest.mark.parametrize("occupancy", [0.4, 1.0])
 def test_a_step_equals_the_dense_equations(shape: tuple[int, int, int], occupancy: float) -> None:
@@ -50,13 +55,13 @@ def test_a_step_equals_the_dense_equations(shape: tuple[int, int, int], occupanc
     chosen = torch.zeros(shape, dtype=torch.bool)
     chosen[tuple(torch.as_tensor((domain.cells[rows] - domain.box.lower).T.astype(np.int64)))] = 1
 
-    state = torch.as_tensor(domain.gather(grid.numpy(), domain.box.lower))
+    state = torch.as_tensor(listed(grid.numpy(), domain))
     state = torch.cat([state, torch.zeros(1, CHANNELS, dtype=torch.float64)])
     got = update(
         state,
         torch.as_tensor(rows),
         torch.as_tensor(domain.neighbours),
-        torch.as_tensor(domain.gather(priors.numpy(), domain.box.lower)),
+        torch.as_tensor(listed(priors.numpy(), domain)),
         weights,
         torch.as_tensor(stencil(), dtype=torch.float64),
     )
@@ -143,7 +148,7 @@ def test_a_grid_cut_into_tiles_with_halos_gives_the_same_bits() -> None:
 
     def step(domain: Domain) -> Tensor:
         dense = whole.scatter(state.numpy(), whole.box)
-        own = torch.as_tensor(domain.gather(dense, (0, 0, 0)))
+        own = torch.as_tensor(listed(dense, domain))
         rows = changing_rows(domain.hashes, seed=0, step=0, probability=0.5)
         result = update(
             torch.cat([own, torch.zeros(1, CHANNELS)]),

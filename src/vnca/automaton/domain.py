@@ -157,14 +157,6 @@ class Domain:
         """The state every rollout starts from: zeros `[n + 1, channels]`."""
         return np.zeros((len(self) + 1, channels), dtype=np.float32)
 
-    def gather(self, field: AnyArray, origin: Index, *, outside: float = 0.0) -> AnyArray:
-        """Values `[n, ...]` of a dense field at the cells, `outside` where it does not reach."""
-        at = self.cells - np.asarray(origin, dtype=np.int32)
-        reached = ((at >= 0) & (at < field.shape[:3])).all(axis=1)
-        values = np.full((len(self), *field.shape[3:]), outside, dtype=field.dtype)
-        values[reached] = field[tuple(at[reached].T)]
-        return values
-
     def scatter(self, values: AnyArray, box: Box) -> AnyArray:
         """Dense `[x, y, z, ...]` over `box` of values `[n, ...]`, zero where nothing lives."""
         at = self.cells - np.asarray(box.lower, dtype=np.int32)

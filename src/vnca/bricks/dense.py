@@ -9,15 +9,19 @@ from vnca.typing import Index
 T = TypeVar("T")
 
 
-def dense(*names: str) -> Callable[[type[T]], type[T]]:
+def dense(*names: str, what: Callable[[Any], str]) -> Callable[[type[T]], type[T]]:
     """A decorator for dataclasses: what some attributes hold may be fields.
 
     Read, those are arrays all the same, each made the first time; `field_of` gives the field.
+
+    Args:
+        names: Of the attributes.
+        what: What a message calls an instance whose arrays are too large.
     """
 
     def decorated(kind: type[T]) -> type[T]:
         for name in names:
-            setattr(kind, name, _Dense(name))
+            setattr(kind, name, _Dense(name, what))
         return kind
 
     return decorated
@@ -45,8 +49,9 @@ def shape_of(instance: object, name: str) -> tuple[int, ...] | None:
 
 
 class _Dense:
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, what: Callable[[Any], str]) -> None:
         self._name = name
+        self._what = what
 
     def __get__(self, instance: Any, owner: type) -> Any:
         if instance is None:
@@ -56,7 +61,7 @@ class _Dense:
             return held
         made = f"{self._name} as an array"
         if made not in instance.__dict__:
-            instance.__dict__[made] = held.dense()
+            instance.__dict__[made] = held.dense(what=self._what(instance))
         return instance.__dict__[made]
 
     def __set__(self, instance: Any, value: Any) -> None:

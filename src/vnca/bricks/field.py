@@ -237,8 +237,12 @@ class Field:
         result[low] = self.blocks(bricks - ahead)[_slab(axis, slice(-step, None))]
         return replace(self, bricks=bricks, values=result).trimmed()
 
-    def dense(self, box: Box | None = None) -> AnyArray:
+    def dense(self, box: Box | None = None, *, what: str = "smoke") -> AnyArray:
         """The array `[x, y, z, ...]` over a box; over all cells unless given.
+
+        Args:
+            box: Which cells.
+            what: What a message calls the field.
 
         Raises:
             GridError: If it would be far larger than what there is.
@@ -247,8 +251,8 @@ class Field:
         cells = math.prod(box.shape)
         if cells > max(MOST_CELLS, len(self.bricks) * CELLS * _SPARSEST):
             raise GridError(
-                f"smoke scattered over cells {box.lower} to {box.upper}: too many to hold as an "
-                "array, which this needs; remove what strays, or resample the grid"
+                f"{what}: scattered over cells {box.lower} to {box.upper}, too many for the arrays "
+                "that pictures, training and fits take; remove what strays, or resample the grid"
             )
         aligned = Box(
             *(_aligned(corner, up) for corner, up in zip(box, (False, True), strict=True))

@@ -174,7 +174,8 @@ def fit_velocity_scale(first: Volume, second: Volume) -> float:
     if moving is None:
         raise GridError(f"frame {first.frame}: no velocity to fit a scale to")
     box = first.box.union(second.box).grown(1)
-    before, after = first.density_field.dense(box), second.density_field.dense(box)
+    both = f"frames {first.frame} and {second.frame}"
+    before, after = (frame.density_field.dense(box, what=both) for frame in (first, second))
     moving = replace(moving, box=box)
     known = replace(moving, values=moving.values.any(axis=-1), outside=False)
     velocity = extrapolated(moving, known, _FIT_LAYERS)[0].dense()

@@ -57,7 +57,7 @@ class RollState:
         return cls(cells, np.zeros((1, channels), dtype=np.float32), steps_done)
 
 
-@dense("density", "colour")
+@dense("density", "colour", what=lambda painting: f"frame {painting.smoke.frame}")
 @dataclass(frozen=True, eq=False)
 class Painting:
     """One painted frame, on the same cells as its smoke.
