@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from vnca.automaton.decoder import Decoder
-from vnca.automaton.domain import Domain
 from vnca.bench.timing import Spread, in_turns
-from vnca.kernels.decode.backend import array_decode, torch_decode
-from vnca.kernels.decode.weights import Weights
-from vnca.typing import AnyArray, Box
+from vnca.core.typing import AnyArray, Box
+from vnca.engine.decode_backend import array_decode, torch_decode
+from vnca.engine.decode_weights import Weights
+from vnca.engine.domain import Domain
+from vnca.rule.decoder import Decoder
 
 FACTOR = 4
 """Parts along a cell, for `cells`."""

@@ -31,22 +31,22 @@ import vnca
 from msoe import published
 from vnca.bench.machine import run_facts
 from vnca.bench.records import append_csv, write_json
-from vnca.camera import frame_box
-from vnca.errors import VncaError
-from vnca.evaluation.estimators import Estimator, dis, estimator_of, farneback
+from vnca.core.camera import frame_box
+from vnca.core.errors import VncaError
 from vnca.features.flow import FlowNetwork
-from vnca.io.image import read_image
+from vnca.io.picture import read_image
 from vnca.io.smoke import SmokeFormat, read_smoke
-from vnca.render.colour import linear_to_srgb, srgb_to_linear
-from vnca.render.sample import sample
-from vnca.render.velocity import projected_velocity
-from vnca.render.view import render
-from vnca.training.config import TrainConfig
+from vnca.metrics.estimators import Estimator, dis, estimator_of, farneback
+from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
+from vnca.rendering.sample import sample
+from vnca.rendering.velocity import projected_velocity
+from vnca.rendering.view import render
 from vnca.training.flow.displacement import random_displacement
 from vnca.training.flow.pairs import moving_texture, random_silhouette
 from vnca.training.flow.textures import KINDS, Kind, bank, cut, log_uniform, uniform
-from vnca.training.smoke import choose_scales
-from vnca.training.smoke_scene import smoke_bounds
+from vnca.training.scenes.smoke import smoke_bounds
+from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_trainer import choose_scales
 
 PICTURES = ("full", "masked", "smoke")
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)

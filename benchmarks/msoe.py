@@ -15,10 +15,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from vnca.errors import FileFormatError
-from vnca.evaluation.estimators import Estimator
-from vnca.files import existing_file
-from vnca.typing import FloatArray
+from vnca.core.errors import FileFormatError
+from vnca.core.files import existing_file
+from vnca.core.typing import FloatArray
+from vnca.metrics.estimators import Estimator
 
 SCALES = 5
 

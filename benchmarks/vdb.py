@@ -12,8 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from vnca.bench.cases import smoke
+from vnca.core.typing import Box
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
-from vnca.typing import Box
 
 
 def best_of(runs: int, work: Callable[[], object]) -> float:

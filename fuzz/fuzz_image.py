@@ -21,7 +21,7 @@ from harness import fuzz
 with atheris.instrument_imports(include=["vnca", "PIL"]):
     from PIL import Image
 
-    from vnca.io.image import read_image
+    from vnca.io.picture import read_image
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PIXELS = 2**14

@@ -18,9 +18,9 @@ from harness import fuzz
 from PIL import Image
 
 with atheris.instrument_imports(include=["vnca"]):
-    from vnca.io.glb import Glb
-    from vnca.io.mesh import read_mesh
-    from vnca.io.mesh_texture import base_colours
+    from vnca.io.mesh.glb import Glb
+    from vnca.io.mesh.mesh import read_mesh
+    from vnca.io.mesh.texture import base_colours
 
 _BETWEEN = b"\0\0\0\0"
 _SUFFIXES = {b"glTF": ".glb", b"ply": ".ply", b"solid": ".stl", b"STL": ".stl", b"v ": ".obj"}

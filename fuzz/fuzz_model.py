@@ -17,10 +17,10 @@ import numpy as np
 from harness import fuzz, lengthened, shortened
 
 with atheris.instrument_imports(include=["vnca", "json"]):
-    from vnca.automaton.decoder import Decoder
-    from vnca.automaton.model import Model, from_record
-    from vnca.automaton.rule import Rule, RuleConfig, Scales
     from vnca.io.smoke_format import SmokeFormat
+    from vnca.rule.decoder import Decoder
+    from vnca.rule.model import Model, from_record
+    from vnca.rule.rule import Rule, RuleConfig, Scales
 
 _FILE, _HEADER, _METADATA = range(3)
 _BETWEEN = b"\n\n"

@@ -15,7 +15,7 @@ import numpy as np
 from harness import fuzz, lengthened, shortened
 
 with atheris.instrument_imports(include=["vnca", "zipfile", "numpy.lib"]):
-    from vnca.errors import VncaError
+    from vnca.core.errors import VncaError
     from vnca.io.npz import read_npz_smoke, read_npz_velocity
     from vnca.io.smoke_format import SmokeFormat
 

@@ -18,12 +18,12 @@ import numpy as np
 from harness import fuzz, lengthened, shortened
 
 with atheris.instrument_imports(include=["vnca"]):
+    from vnca.core.typing import Box
     from vnca.io import vdb_smoke
     from vnca.io.smoke import SmokeFormat, read_smoke
     from vnca.io.vdb import VALUE_TYPES, Grid, Tiles, Transform, open_vdb, write_vdb
     from vnca.io.vdb.cursor import Cursor, encode_string
     from vnca.io.vdb.metadata import Metadata, read_metadata
-    from vnca.typing import Box
 
 _BETWEEN = b"\xfe\xfd\xfe"
 _AHEAD, _CLAIMS_OFFSETS = 57, 20  # bytes of the header, and which of them says that

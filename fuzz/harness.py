@@ -29,7 +29,7 @@ sys.meta_path = [f for f in sys.meta_path if type(f).__name__ != "ScikitBuildRed
 sys.path.insert(0, str(_ROOT / "src"))
 
 with atheris.instrument_imports(include=["vnca"]):
-    from vnca.errors import VncaError
+    from vnca.core.errors import VncaError
 
 SECONDS = 5
 SLACK = 4 << 20  # bytes that an execution may take whatever the file: the interpreter's own

@@ -11,14 +11,14 @@ import pytest
 import torch
 from jaxtyping import config, install_import_hook
 
-from vnca.volume import Volume
+from vnca.core.volume import Volume
 
 # Before Triton is imported. Without an NVIDIA GPU its kernels run in its interpreter, on the CPU.
 if not torch.cuda.is_available():
     os.environ.setdefault("TRITON_INTERPRET", "1")
 
 # Shapes written in signatures are checked in tests, and only there.
-install_import_hook(["vnca.render", "vnca.losses", "vnca.features"], "beartype.beartype")
+install_import_hook(["vnca.rendering", "vnca.losses", "vnca.features"], "beartype.beartype")
 
 
 @pytest.fixture(scope="session", autouse=True)

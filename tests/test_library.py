@@ -25,9 +25,9 @@ def test_every_name_is_there_and_listed(name: str) -> None:
 
 
 def test_a_name_is_the_thing_itself() -> None:
-    from vnca.render.view import render
-    from vnca.stylize.roll import stylize
-    from vnca.volume import Volume
+    from vnca.core.volume import Volume
+    from vnca.painting.roll import stylize
+    from vnca.rendering.view import render
 
     assert vnca.Volume is Volume
     assert vnca.render_view is render

@@ -19,10 +19,11 @@ from torch import Tensor
 import vnca
 from vnca.bench.cases import PROBABILITY, Case, Place
 from vnca.bench.contenders import DTYPES
-from vnca.kernels.update import triton, triton_mask
-from vnca.kernels.update.reference import Weights
-from vnca.kernels.update.stencil import stencil
-from vnca.typing import Index
+from vnca.core.typing import Index
+from vnca.engine.reference.step import Weights
+from vnca.engine.stencil import stencil
+from vnca.engine.triton import mask as triton_mask
+from vnca.engine.triton import step as triton
 
 COLUMNS = ("date", "device", "torch", "vnca", "what", "dtype", "grid", "occupancy", "ms", "peak_mb")
 

@@ -23,8 +23,8 @@ import numpy
 import torch
 import triton
 
-from vnca.kernels.update import native
-from vnca.kernels.update.backend import choose
+from vnca.engine import native
+from vnca.engine.backend import choose
 
 print(f"python {sys.version.split()[0]}, numpy {numpy.__version__}, triton {triton.__version__}")
 print(f"torch {torch.__version__}, CUDA {torch.version.cuda}, {torch.cuda.get_device_name()}")
@@ -37,13 +37,13 @@ tests() {
     # Most of the time goes into compiling kernels: in parallel, where pytest can do that.
     local workers=()
     python3 -c "import xdist" 2> /dev/null && workers=(-n 12)
-    python3 -m pytest -q -p no:cacheprovider -W default "${workers[@]}" tests/kernels
+    python3 -m pytest -q -p no:cacheprovider -W default "${workers[@]}" tests/engine
 }
 
 memcheck() {
     command -v compute-sanitizer > /dev/null || { echo "compute-sanitizer is not there"; return; }
     compute-sanitizer --tool memcheck --error-exitcode 1 \
-        python3 -m pytest -q -p no:cacheprovider -W default tests/kernels/test_conformance.py \
+        python3 -m pytest -q -p no:cacheprovider -W default tests/engine/test_conformance.py \
         -k "triton and (odd or flat or portions or wraps)"
 }
 

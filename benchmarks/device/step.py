@@ -10,7 +10,7 @@ from pathlib import Path
 
 from vnca.bench.records import append_csv
 from vnca.bench.step import StepConfig, measure_steps, prepare
-from vnca.typing import Index
+from vnca.core.typing import Index
 
 SMALL, LARGE = (64, 64, 64), (200, 300, 200)
 OCCUPANCIES = (0.01, 0.05, 0.15, 0.5)

@@ -1,4 +1,4 @@
-"""Which tile, warps and programs suit a GPU: the constants of `vnca/kernels/update/triton.py`.
+"""Which tile, warps and programs suit a GPU: the constants of `vnca/engine/triton/step.py`.
 
 Run `python benchmarks/device/sweep.py --csv FILE`. Each is varied alone, from what is there now.
 """
@@ -15,7 +15,7 @@ from triton.runtime.errors import OutOfResources
 from vnca.bench.cases import Case, Place
 from vnca.bench.contenders import DTYPES, contender
 from vnca.bench.timing import Begin, seconds
-from vnca.kernels.update import triton
+from vnca.engine.triton import step as triton
 
 CHOICES: dict[str, tuple[Any, ...]] = {
     "TILE": (32, 64, 128),

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from judge import AROUND, PAINTED, Judge, magnified
 from study import REFERENCE, Findings, Study, run
 
-from vnca.automaton.rule import Rule
-from vnca.automaton.stepper import stepper
 from vnca.bench.memory import peak_mb
-from vnca.errors import OptionError
-from vnca.stylize.roll import Roll
-from vnca.training.smoke_scene import smoke_bounds
-from vnca.volume import Volume
+from vnca.core.errors import OptionError
+from vnca.core.volume import Volume
+from vnca.painting.roll import Roll
+from vnca.rule.rule import Rule
+from vnca.rule.stepper import stepper
+from vnca.training.scenes.smoke import smoke_bounds
 
 PAPERS_GRID = 3.125
 """So many times finer, the 64×64×96 cells around the frame of the tests are 200×200×300."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from judge import UNPAINTED, Judge, paint
 from study import REFERENCE, Findings, Study, run
 
-from vnca.automaton.domain import DomainKind
-from vnca.training.config import TrainConfig
+from vnca.engine.domain import DomainKind
+from vnca.training.smoke_config import TrainConfig
 
 DOMAINS = {"active": "smoke", "box": "its box"}
 

@@ -17,12 +17,12 @@ import numpy as np
 from judge import PAINTED, UNPAINTED, Judge, magnified, paint
 from study import REFERENCE, Findings, Study, run
 
-from vnca.automaton.rule import Rule
-from vnca.automaton.stepper import stepper
 from vnca.cli.sequence import open_sequence, sequence_region, volumes
 from vnca.cli.simulate import Simulate, write_simulation
-from vnca.simulate.scenes import simulate
-from vnca.stylize.roll import Painting, stylize
+from vnca.painting.roll import Painting, stylize
+from vnca.rule.rule import Rule
+from vnca.rule.stepper import stepper
+from vnca.simulation.scenes import simulate
 
 RESOLUTION = 48
 """Of simulated scenes: cells across."""

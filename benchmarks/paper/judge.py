@@ -7,20 +7,20 @@ import torch
 from scipy.ndimage import zoom
 from study import Study
 
-from vnca.automaton.rule import Rule
-from vnca.automaton.stepper import stepper
-from vnca.camera import frame_box
+from vnca.core.camera import frame_box
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
 from vnca.features.load import load_network
-from vnca.io.image import fit, read_image
+from vnca.io.picture import fit, read_image
 from vnca.io.sheet import contact_sheet
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
-from vnca.render.colour import linear_to_srgb
-from vnca.render.view import Mode, View, render
-from vnca.stylize.config import StylizeConfig
-from vnca.stylize.roll import Painting, Roll
-from vnca.training.smoke_scene import PORTRAIT_BACKGROUND, PORTRAIT_STEP, PORTRAITS, smoke_bounds
-from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.painting.config import StylizeConfig
+from vnca.painting.roll import Painting, Roll
+from vnca.rendering.colour import linear_to_srgb
+from vnca.rendering.view import Mode, View, render
+from vnca.rule.rule import Rule
+from vnca.rule.stepper import stepper
+from vnca.training.scenes.smoke import PORTRAIT_BACKGROUND, PORTRAIT_STEP, PORTRAITS, smoke_bounds
 
 Sight = tuple[float, float]
 """Azimuth and elevation, degrees."""

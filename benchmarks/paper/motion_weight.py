@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from judge import Judge, paint
 from study import Findings, Study, run
 
-from vnca.evaluation.estimators import dis, ours
-from vnca.evaluation.motion import MotionMeasures, measure_motion
+from vnca.metrics.estimators import dis, ours
+from vnca.metrics.motion import MotionMeasures, measure_motion
 
 
 @dataclass(frozen=True)

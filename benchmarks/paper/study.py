@@ -13,22 +13,22 @@ import numpy as np
 import torch
 import tyro
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule, RuleConfig
 from vnca.bench.machine import run_facts
 from vnca.bench.records import append_csv
 from vnca.cli.session import choose_device
 from vnca.cli.train import Train, train
-from vnca.errors import OptionError, VncaError
-from vnca.files import existing_file, writable_folder
-from vnca.io.image import write_image
+from vnca.core.errors import OptionError, VncaError
+from vnca.core.files import existing_file, writable_folder
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
+from vnca.io.picture import write_image
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.losses.appearance import AppearanceConfig
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule, RuleConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME
-from vnca.training.config import PRESETS, TrainConfig, ViewConfig
-from vnca.training.course import PoolConfig
-from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.training.config import PoolConfig
+from vnca.training.smoke_config import PRESETS, TrainConfig, ViewConfig
 
 ROOT = Path(__file__).parents[2]
 REFERENCE = "reference"

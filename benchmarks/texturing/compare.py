@@ -22,20 +22,20 @@ from typing import Any
 import torch
 from solid import optimised_blocks
 
-from vnca.automaton.model import Model
-from vnca.automaton.rule import Rule
-from vnca.automaton.stepper import stepper
 from vnca.bench.machine import run_facts
 from vnca.bench.records import append_csv, write_json
+from vnca.core.typing import FloatArray
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
-from vnca.io.image import read_image
+from vnca.io.picture import read_image
 from vnca.losses.appearance import AppearanceLoss
-from vnca.texturing.block import border_jump, grow
-from vnca.texturing.config import PRESETS
-from vnca.texturing.distance import slice_distances
-from vnca.texturing.training import texture_trainer
-from vnca.typing import FloatArray
+from vnca.metrics.slice_distance import slice_distances
+from vnca.painting.block import border_jump, grow
+from vnca.rule.model import Model
+from vnca.rule.rule import Rule
+from vnca.rule.stepper import stepper
+from vnca.training.texture_config import PRESETS
+from vnca.training.texture_trainer import texture_trainer
 
 
 @dataclass(frozen=True)

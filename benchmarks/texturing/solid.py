@@ -13,11 +13,11 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
-from vnca.colour import linear_to_srgb
+from vnca.core.colour import linear_to_srgb
+from vnca.core.typing import FloatArray
 from vnca.losses.appearance import AppearanceLoss
-from vnca.render.colour import srgb_to_linear
-from vnca.texturing.slices import as_picture, axis_angles, oblique_angles, shown, slice_points
-from vnca.typing import FloatArray
+from vnca.rendering.colour import srgb_to_linear
+from vnca.training.scenes.slices import as_picture, axis_angles, oblique_angles, shown, slice_points
 
 LEARNING_RATE = 0.02
 SLICES = 3

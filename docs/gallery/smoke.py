@@ -14,7 +14,7 @@ from pathlib import Path
 
 from workshop import HERE, drawn, made, texture_of
 
-from vnca.io.image import fit, read_image, write_image
+from vnca.io.picture import fit, read_image, write_image
 
 FILMS = HERE / "smoke"
 SCENES = {"plume": (64, 40), "jets": (64, 40), "ring": (64, 40)}

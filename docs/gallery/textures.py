@@ -13,11 +13,11 @@ from pathlib import Path
 import knot
 from workshop import HERE, drawn, made, texture_of
 
-from vnca.io.image import fit, read_image, write_image
-from vnca.io.mesh import read_mesh
+from vnca.core.typing import FloatArray
+from vnca.io.mesh.mesh import read_mesh
+from vnca.io.picture import fit, read_image, write_image
 from vnca.io.sheet import contact_sheet
-from vnca.texturing.turntable import Turntable, TurntableConfig, textured
-from vnca.typing import FloatArray
+from vnca.meshes.turntable import Turntable, TurntableConfig, textured
 
 FILMS = HERE / "textures"
 FILM = ("--rows", 200, "--columns", 200, "--frames", 36, "--fps", 12)

@@ -14,7 +14,7 @@ import numpy as np
 from vnca.cli.film import FilmConfig
 from vnca.cli.render import Render, strip
 from vnca.cli.sequence import open_sequence
-from vnca.io.image import write_image
+from vnca.io.picture import write_image
 
 SIZE = 384
 FRAME = 16

@@ -10,64 +10,64 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from vnca.automaton.model import Model
-    from vnca.automaton.rule import Rule, RuleConfig, Scales
-    from vnca.automaton.stepper import stepper
-    from vnca.camera import Orthographic, Perspective, frame_box
-    from vnca.errors import VncaError
+    from vnca.core.camera import Orthographic, Perspective, frame_box
+    from vnca.core.errors import VncaError
+    from vnca.core.lattice import Lattice
+    from vnca.core.typing import Box
+    from vnca.core.volume import Volume
     from vnca.features.load import load_network
-    from vnca.io.image import read_image, write_image
+    from vnca.io.film import FilmWriter
+    from vnca.io.picture import read_image, write_image
     from vnca.io.sequence import find_frames
     from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
     from vnca.io.vdb import open_vdb, write_vdb
-    from vnca.io.video import FilmWriter
-    from vnca.lattice import Lattice
-    from vnca.render.view import View
-    from vnca.render.view import render as render_view
-    from vnca.simulate.scenes import simulate as simulate_smoke
-    from vnca.stylize.config import StylizeConfig
-    from vnca.stylize.roll import Painting
-    from vnca.stylize.roll import stylize as stylize_frames
-    from vnca.training.config import PRESETS, TrainConfig
+    from vnca.painting.config import StylizeConfig
+    from vnca.painting.roll import Painting
+    from vnca.painting.roll import stylize as stylize_frames
+    from vnca.rendering.view import View
+    from vnca.rendering.view import render as render_view
+    from vnca.rule.model import Model
+    from vnca.rule.rule import Rule, RuleConfig, Scales
+    from vnca.rule.stepper import stepper
+    from vnca.simulation.scenes import simulate as simulate_smoke
     from vnca.training.loop import Trainer
-    from vnca.training.smoke import smoke_trainer
-    from vnca.typing import Box
-    from vnca.volume import Volume
+    from vnca.training.smoke_config import PRESETS, TrainConfig
+    from vnca.training.smoke_trainer import smoke_trainer
 
 # Functions that share the name of a subpackage have one of their own here: an imported
 # subpackage takes its name in this one.
 _HOMES = {
-    "Box": "typing",
-    "FilmWriter": "io.video",
-    "Lattice": "lattice",
-    "Model": "automaton.model",
-    "Orthographic": "camera",
-    "PRESETS": "training.config",
-    "Painting": "stylize.roll",
-    "Perspective": "camera",
-    "Rule": "automaton.rule",
-    "RuleConfig": "automaton.rule",
-    "Scales": "automaton.rule",
+    "Box": "core.typing",
+    "FilmWriter": "io.film",
+    "Lattice": "core.lattice",
+    "Model": "rule.model",
+    "Orthographic": "core.camera",
+    "PRESETS": "training.smoke_config",
+    "Painting": "painting.roll",
+    "Perspective": "core.camera",
+    "Rule": "rule.rule",
+    "RuleConfig": "rule.rule",
+    "Scales": "rule.rule",
     "SmokeFormat": "io.smoke",
-    "StylizeConfig": "stylize.config",
-    "TrainConfig": "training.config",
+    "StylizeConfig": "painting.config",
+    "TrainConfig": "training.smoke_config",
     "Trainer": "training.loop",
-    "View": "render.view",
-    "VncaError": "errors",
-    "Volume": "volume",
+    "View": "rendering.view",
+    "VncaError": "core.errors",
+    "Volume": "core.volume",
     "find_frames": "io.sequence",
-    "frame_box": "camera",
+    "frame_box": "core.camera",
     "load_network": "features.load",
     "open_vdb": "io.vdb",
-    "read_image": "io.image",
+    "read_image": "io.picture",
     "read_smoke": "io.smoke",
-    "render_view": "render.view:render",
-    "simulate_smoke": "simulate.scenes:simulate",
+    "render_view": "rendering.view:render",
+    "simulate_smoke": "simulation.scenes:simulate",
     "smoke_box": "io.smoke",
-    "smoke_trainer": "training.smoke",
-    "stepper": "automaton.stepper",
-    "stylize_frames": "stylize.roll:stylize",
-    "write_image": "io.image",
+    "smoke_trainer": "training.smoke_trainer",
+    "stepper": "rule.stepper",
+    "stylize_frames": "painting.roll:stylize",
+    "write_image": "io.picture",
     "write_painted": "io.smoke",
     "write_smoke": "io.smoke",
     "write_vdb": "io.vdb",

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.automaton.domain import Domain
 from vnca.bench.cases import Case, Place
 from vnca.bench.plain import PlainUpdate
-from vnca.kernels.update import reference
-from vnca.kernels.update.stencil import stencil
-from vnca.typing import Box
+from vnca.core.typing import Box
+from vnca.engine.domain import Domain
+from vnca.engine.reference import step as reference
+from vnca.engine.stencil import stencil
 
 DOUBLE = Place("cpu", torch.float64)
 

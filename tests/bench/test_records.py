@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vnca.bench.records import append_csv, write_json
-from vnca.errors import FileFormatError
+from vnca.core.errors import FileFormatError
 
 FACTS = {"device": "abacus, wooden"}
 

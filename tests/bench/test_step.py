@@ -14,8 +14,10 @@ from vnca.bench.step import (
     needed_flop,
     prepare,
 )
-from vnca.errors import BackendUnavailableError, DisagreementError, OptionError, VncaError
-from vnca.kernels.update import native, reference, triton
+from vnca.core.errors import BackendUnavailableError, DisagreementError, OptionError, VncaError
+from vnca.engine.native import step as native
+from vnca.engine.reference import step as reference
+from vnca.engine.triton import step as triton
 
 Make = Callable[..., StepConfig]
 ALWAYS = ("plain", "reference")

@@ -5,15 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.automaton.rule import Rule
-from vnca.automaton.stepper import Step, stepper
 from vnca.bench import stylize
 from vnca.bench.stylize import PaintedSequence, available, measure_stylizing, random_rule
-from vnca.errors import DisagreementError
+from vnca.core.errors import DisagreementError
+from vnca.core.volume import Volume
+from vnca.engine.native import step as native
 from vnca.io.sequence import find_frames
 from vnca.io.smoke import SmokeFormat, write_smoke
-from vnca.kernels.update import native
-from vnca.volume import Volume
+from vnca.rule.rule import Rule
+from vnca.rule.stepper import Step, stepper
 
 
 @pytest.fixture

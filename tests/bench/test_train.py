@@ -8,13 +8,13 @@ import torch
 
 from vnca.bench import train
 from vnca.bench.train import Training, measure_training
-from vnca.errors import DisagreementError
+from vnca.core.errors import DisagreementError
+from vnca.core.volume import Volume
+from vnca.engine.reference import step as reference
 from vnca.features.vgg import VGG16
-from vnca.io.image import read_image, resize
-from vnca.kernels.update import reference
+from vnca.io.picture import read_image, resize
 from vnca.losses.appearance import AppearanceConfig
-from vnca.training.config import PRESETS, ViewConfig
-from vnca.volume import Volume
+from vnca.training.smoke_config import PRESETS, ViewConfig
 
 
 @pytest.fixture

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.cli import main
+from vnca.core.volume import Volume
 from vnca.io.smoke import write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
-from vnca.volume import Volume
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule, RuleConfig, Scales
 
 TINY = (
     *("--iterations", "2", "--hidden", "8", "--channels", "6", "--view.size", "32"),

@@ -14,13 +14,13 @@ import pytest
 from PIL import Image
 from safetensors.numpy import load_file, save_file
 
-from vnca.automaton.model import MODEL_NAME
+from vnca.core.volume import Volume
 from vnca.features.efficientnet import EfficientNet
 from vnca.features.vgg import VGG16
 from vnca.io.smoke import write_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
+from vnca.rule.model import MODEL_NAME
 from vnca.training.loop import Trainer
-from vnca.volume import Volume
 
 Vnca = Callable[..., Any]
 QUICK = ("--warmup", 1, "--steps-per-frame", 1)
@@ -48,7 +48,7 @@ def no_long_work(monkeypatch: pytest.MonkeyPatch) -> None:
     for network in (EfficientNet, VGG16):
         monkeypatch.setattr(network, "load", begin)
     monkeypatch.setattr(Trainer, "improve", begin)
-    monkeypatch.setattr("vnca.stylize.roll.Roll.paint", begin)
+    monkeypatch.setattr("vnca.painting.roll.Roll.paint", begin)
     monkeypatch.setattr("vnca.cli.render.read_colour", begin)
 
 
@@ -570,7 +570,7 @@ def test_running_out_of_memory_is_told(
 def test_a_message_of_several_lines_becomes_one(
     vnca: Vnca, frame: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from vnca.errors import FileFormatError
+    from vnca.core.errors import FileFormatError
 
     def fail(*_: object) -> None:
         raise FileFormatError("a.vdb: damaged\n  at byte 3")

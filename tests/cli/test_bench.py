@@ -11,7 +11,9 @@ import torch
 from torch import Tensor
 
 from vnca.bench import contenders
-from vnca.kernels.update import native, reference, triton
+from vnca.engine.native import step as native
+from vnca.engine.reference import step as reference
+from vnca.engine.triton import step as triton
 
 Vnca = Callable[..., Any]
 STEP = (

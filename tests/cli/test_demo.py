@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vnca.automaton.rule import RuleConfig
 from vnca.cli import demo
 from vnca.cli.demo import Demo
 from vnca.cli.simulate import Simulate, write_simulation
 from vnca.cli.stylize import Stylize, paint
 from vnca.losses.appearance import AppearanceConfig
-from vnca.training.config import TrainConfig, ViewConfig
+from vnca.rule.rule import RuleConfig
+from vnca.training.smoke_config import TrainConfig, ViewConfig
 
 Vnca = Callable[..., Any]
 

@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from vnca.automaton.model import MODEL_NAME
-from vnca.errors import BackendUnavailableError
+from vnca.core.errors import BackendUnavailableError
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
+from vnca.rule.model import MODEL_NAME
 
 Vnca = Callable[..., Any]
 FEW = ("--warmup", "4", "--steps-per-frame", "2")
@@ -26,7 +26,7 @@ NAMES = {
 
 @pytest.fixture(autouse=True)
 def small_pictures_of_motion(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vnca.evaluation.survey.MOTION_SIZE", 40)
+    monkeypatch.setattr("vnca.metrics.survey.MOTION_SIZE", 40)
 
 
 class Page(HTMLParser):

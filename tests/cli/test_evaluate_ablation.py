@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from vnca.automaton.model import Model
+from vnca.rule.model import Model
 from vnca.training.checkpoint import CHECKPOINT_NAME
 
 Vnca = Callable[..., Any]

@@ -2,8 +2,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from vnca.automaton.model import MODEL_NAME
 from vnca.io.vdb import write_vdb
+from vnca.rule.model import MODEL_NAME
 
 Vnca = Callable[..., Any]
 

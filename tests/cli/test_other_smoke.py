@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
+from vnca.core.volume import Volume
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
-from vnca.training.config import TrainConfig
-from vnca.volume import Volume
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.training.smoke_config import TrainConfig
 
 Vnca = Callable[..., Any]
 QUICK = ("--warmup", 2, "--steps-per-frame", 1)

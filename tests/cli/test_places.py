@@ -12,22 +12,22 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vnca.automaton.model import Model
-from vnca.automaton.rule import Rule, RuleConfig, Scales
-from vnca.automaton.stepper import stepper
 from vnca.cli.sequence import read_alone
+from vnca.core.lattice import Lattice
+from vnca.core.typing import AnyArray, Index
+from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
-from vnca.io.image import fit, read_image
+from vnca.io.picture import fit, read_image
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
-from vnca.lattice import Lattice
 from vnca.losses.appearance import AppearanceConfig
-from vnca.stylize.config import StylizeConfig
-from vnca.stylize.roll import stylize
-from vnca.training.config import TrainConfig, ViewConfig
-from vnca.training.smoke import smoke_trainer
-from vnca.typing import AnyArray, Index
-from vnca.volume import Volume
+from vnca.painting.config import StylizeConfig
+from vnca.painting.roll import stylize
+from vnca.rule.model import Model
+from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.rule.stepper import stepper
+from vnca.training.smoke_config import TrainConfig, ViewConfig
+from vnca.training.smoke_trainer import smoke_trainer
 
 Vnca = Callable[..., Any]
 DATA = Path(__file__).parents[1] / "data"

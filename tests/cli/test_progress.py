@@ -6,7 +6,7 @@ import pytest
 from vnca.cli import main
 from vnca.cli.options import say
 from vnca.cli.progress import Progress, tracked
-from vnca.errors import SequenceError
+from vnca.core.errors import SequenceError
 
 
 class Terminal(io.StringIO):

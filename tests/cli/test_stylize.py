@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.automaton.model import Model
-from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.cli import main
 from vnca.cli.stylize import Stylize
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
+from vnca.core.typing import AnyArray
+from vnca.core.volume import Volume
+from vnca.engine.native import step as native
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
-from vnca.kernels.update import native
-from vnca.stylize.roll import Roll, RollState
-from vnca.typing import AnyArray
-from vnca.volume import Volume
+from vnca.painting.roll import Roll, RollState
+from vnca.rule.model import Model
+from vnca.rule.rule import Rule, RuleConfig, Scales
 
 Vnca = Callable[..., Any]
 Paint = Callable[..., Path]
@@ -404,7 +404,7 @@ def test_without_torch_and_a_compiler_the_slow_step_runs_and_says_so_once(
     painted: Paint, model: Path, smoke: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "slow"
-    absent = "vnca.kernels.update._native"
+    absent = "vnca.engine.native._native"
     done = without_training("stylize", model, smoke, "--out", out, *QUICK, absent=absent)
     assert done.returncode == 0, done.stderr
     assert done.stderr.count("running the slow reference step: its extension was not built") == 1

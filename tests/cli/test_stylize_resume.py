@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule
+from vnca.core.volume import Volume
+from vnca.engine.native import step as native
 from vnca.io.sequence import find_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
-from vnca.kernels.update import native
-from vnca.stylize.roll import Painting, Roll, RollState
-from vnca.stylize.unfinished import Unfinished
-from vnca.volume import Volume
+from vnca.painting.roll import Painting, Roll, RollState
+from vnca.painting.unfinished import Unfinished
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule
 
 Vnca = Callable[..., Any]
 QUICK = ("--warmup", 4, "--steps-per-frame", 2)
@@ -334,7 +334,7 @@ def test_keeping_the_state_takes_little_time(
         during(1, painting)
 
     monkeypatch.setattr(Unfinished, "save", slowly)
-    monkeypatch.setattr("vnca.stylize.painter.time.monotonic", lambda: now)
+    monkeypatch.setattr("vnca.painting.painter.time.monotonic", lambda: now)
     during(1, painting)
     assert painted.run().code == 0
     assert saved == ([1, 3] if seconds == 1 else [1, 2, 3])

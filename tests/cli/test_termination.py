@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from vnca.cli.termination import finishing, terminable
-from vnca.errors import Terminated
+from vnca.core.errors import Terminated
 
 Vnca = Callable[..., Any]
 

@@ -9,13 +9,13 @@ import pytest
 import trimesh
 from PIL import Image
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import DENSITY_CHANGE, RuleConfig
-from vnca.io.glb import Glb
+from vnca.core.typing import Box
+from vnca.io.mesh.glb import Glb
 from vnca.io.vdb import open_vdb
-from vnca.texturing.config import TextureConfig
-from vnca.texturing.training import initial_rule
-from vnca.typing import Box
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import DENSITY_CHANGE, RuleConfig
+from vnca.training.texture_config import TextureConfig
+from vnca.training.texture_trainer import initial_rule
 
 Vnca = Callable[..., Any]
 

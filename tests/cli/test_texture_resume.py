@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 import trimesh
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.errors import Terminated
+from vnca.core.errors import Terminated
+from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME
 from vnca.training.loop import Progress, Trainer
 

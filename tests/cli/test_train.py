@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vnca.automaton.model import MODEL_NAME, Model
+from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
-from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.loop import Progress, Trainer
+from vnca.training.smoke_config import PRESETS, TrainConfig
 
 Vnca = Callable[..., Any]
 Run = Callable[..., Path]

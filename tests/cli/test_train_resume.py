@@ -11,9 +11,9 @@ import torch
 from PIL import Image
 from safetensors.torch import load_file, save_file
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.errors import Terminated
+from vnca.core.errors import Terminated
 from vnca.losses.appearance import Appearance, AppearanceLoss
+from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME
 from vnca.training.loop import Progress, Trainer
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from vnca.colour import srgb_to_linear
+from vnca.core.colour import srgb_to_linear
+from vnca.core.typing import AnyArray, Index
+from vnca.core.volume import Volume
 from vnca.io.provenance import read_provenance
 from vnca.io.smoke import write_smoke
 from vnca.io.vdb import Grid, Transform, write_vdb
-from vnca.typing import AnyArray, Index
-from vnca.volume import Volume
 
 Vnca = Callable[..., Any]
 CAMERA = (

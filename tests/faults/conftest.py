@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vnca.automaton.model import Model
-from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.core.volume import Volume
 from vnca.io.smoke import write_smoke
-from vnca.volume import Volume
+from vnca.rule.model import Model
+from vnca.rule.rule import Rule, RuleConfig, Scales
 
 MOMENTS = ("torn", "written", "renamed", "seconds")
 

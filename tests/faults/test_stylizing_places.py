@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from vnca.cli import main
+from vnca.core.volume import Volume
 from vnca.io.vdb import open_vdb
-from vnca.stylize.roll import Painting, Roll, RollState
-from vnca.volume import Volume
+from vnca.painting.roll import Painting, Roll, RollState
 
 pytestmark = [
     pytest.mark.faults,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from vnca.automaton.model import Model
 from vnca.cli import main
+from vnca.rule.model import Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, Thrift
 from vnca.training.loop import Progress, Trainer
 

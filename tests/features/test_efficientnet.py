@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from vnca.errors import BackendUnavailableError, FileFormatError, OptionError, ShapeError
+from vnca.core.errors import BackendUnavailableError, FileFormatError, OptionError, ShapeError
 from vnca.features import efficientnet as module
 from vnca.features.efficientnet import FILE, LAYERS, PACKAGE, SHA256, STYLE_LAYERS, EfficientNet
 from vnca.features.installed import file_sha256, installed_file

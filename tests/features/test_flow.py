@@ -9,7 +9,7 @@ from safetensors.torch import save_file
 from torch import Generator, Tensor
 from torch.nn import functional
 
-from vnca.errors import FileFormatError, ShapeError
+from vnca.core.errors import FileFormatError, ShapeError
 from vnca.features.flow import FlowNetwork
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
 from vnca.features.weights import Weights, load_weights, save_weights

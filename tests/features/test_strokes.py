@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vnca.core.typing import FloatArray
 from vnca.features.strokes import COARSEST, FINEST, picture_cells, stroke_width
-from vnca.typing import FloatArray
 
 SIZE = 128
 DARK, BRIGHT = (0.05, 0.1, 0.2), (0.9, 0.7, 0.3)

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from vnca.errors import OptionError, ShapeError
+from vnca.core.errors import OptionError, ShapeError
 from vnca.features.vgg import STYLE_LAYERS, VGG16
 from vnca.features.weights import CONVOLUTIONS, Weights
 

@@ -18,7 +18,7 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
-from vnca.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
+from vnca.core.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
 from vnca.features import download
 from vnca.features import weights as module
 from vnca.features.vgg import STYLE_LAYERS, VGG16

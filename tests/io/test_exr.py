@@ -7,9 +7,9 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from vnca.errors import BackendUnavailableError, FileFormatError
-from vnca.io.image import read_image, read_style, write_image
-from vnca.typing import AnyArray
+from vnca.core.errors import BackendUnavailableError, FileFormatError
+from vnca.core.typing import AnyArray
+from vnca.io.picture import read_image, read_style, write_image
 
 DATA = Path(__file__).parents[1] / "data"
 LIGHT = np.random.default_rng(0).random((6, 9, 3)).astype(np.float32)

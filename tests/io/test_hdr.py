@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vnca.errors import FileFormatError
-from vnca.io.image import read_image
+from vnca.core.errors import FileFormatError
+from vnca.io.picture import read_image
 
 LIGHT = np.random.default_rng(0).random((9, 12, 3)).astype(np.float32)
 

@@ -2,9 +2,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.bricks.field import Field
+from vnca.core.bricks.field import Field
+from vnca.core.typing import AnyArray, BoolArray, FloatArray
 from vnca.io import interpolation
-from vnca.typing import AnyArray, BoolArray, FloatArray
 
 SHAPE = (4, 3, 5)
 EVERYWHERE = np.ones(SHAPE, np.bool_)

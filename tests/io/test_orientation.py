@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
+from vnca.core.lattice import MOST_CELLS, Lattice
+from vnca.core.typing import AnyArray, FloatArray
+from vnca.core.volume import Volume
 from vnca.io.orientation import on_lattice, on_one_lattice, own_cells, upright_world
-from vnca.lattice import MOST_CELLS, Lattice
-from vnca.typing import AnyArray, FloatArray
-from vnca.volume import Volume
 
 MOVED = np.array([[0, 0, 0.5, 3], [0.5, 0, 0, -2], [0, -0.5, 0, 7], [0, 0, 0, 1.0]])
 

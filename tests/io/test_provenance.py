@@ -3,12 +3,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vnca.errors import FileFormatError
+from vnca.core.errors import FileFormatError
+from vnca.core.volume import Volume
 from vnca.io.painted import write_painted, write_smoke
 from vnca.io.provenance import Provenance, read_provenance
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.io.vdb import open_vdb, write_vdb
-from vnca.volume import Volume
 
 PLAIN = SmokeFormat()
 PAINTED = Provenance(2.5, 0.75, "z", {"model": "night", "refine": 2, "strength": 0.5})

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.errors import OptionError, SequenceError
+from vnca.core.errors import OptionError, SequenceError
 from vnca.io.sequence import find_frames, format_frames, frames_beside, parse_frames
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vnca.errors import OptionError, ShapeError
+from vnca.core.errors import OptionError, ShapeError
 from vnca.io.sheet import contact_sheet
 
 RED, GREEN = np.zeros((2, 10, 20, 3), np.float32)

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.errors import FileFormatError, GridError, OptionError, SequenceError
+from vnca.core.errors import FileFormatError, GridError, OptionError, SequenceError
+from vnca.core.typing import AnyArray, Box, Index
+from vnca.core.volume import Volume
 from vnca.io.sequence import Frame
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, with_fitted_scale, write_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
-from vnca.typing import AnyArray, Box, Index
-from vnca.volume import Volume
 
 PLAIN = SmokeFormat()
 TRANSFORM = Transform.uniform(0.5, (1, 2, 3))

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
 from vnca.io.smoke_format import SmokeFormat
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 from vnca.io.vdb_grids import listed_vectors, velocity_headers

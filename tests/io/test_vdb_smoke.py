@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
+from vnca.core.typing import Box
 from vnca.io.smoke import read_smoke
 from vnca.io.smoke_format import SmokeFormat
 from vnca.io.vdb import Grid, Metadata, Tiles, Transform, Tree, open_vdb, write_vdb
 from vnca.io.vdb_smoke import read_density, read_vdb_smoke
-from vnca.typing import Box
 
 
 def two_cells(distance: int) -> Grid:

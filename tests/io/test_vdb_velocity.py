@@ -10,13 +10,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
+from vnca.core.typing import AnyArray, Index
+from vnca.core.volume import Volume
 from vnca.io.painted import write_painted
 from vnca.io.smoke import EXTRAPOLATED_CELLS, SmokeFormat, read_smoke, write_smoke
 from vnca.io.smoke_format import UNITS_METADATA
 from vnca.io.vdb import Grid, Transform, write_vdb
-from vnca.typing import AnyArray, Index
-from vnca.volume import Volume
 
 METRES = SmokeFormat(velocity_units="m/s", fps=10)
 FINE, COARSE = (np.diag([size, size, size, 1.0]) for size in (0.5, 1.0))

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.bricks.field import Field
-from vnca.errors import GridError, OptionError
+from vnca.core.bricks.field import Field
+from vnca.core.errors import GridError, OptionError
+from vnca.core.typing import BoolArray, FloatArray, Index
+from vnca.core.volume import Volume
 from vnca.io import velocity as in_fields
 from vnca.io.velocity import cells_per_frame, fit_velocity_scale
-from vnca.typing import BoolArray, FloatArray, Index
-from vnca.volume import Volume
 
 
 def mask(shape: tuple[int, int, int], *cells: tuple[int, int, int]) -> BoolArray:

@@ -10,13 +10,13 @@ from PIL import Image
 from torch import Tensor
 
 import vnca
-from vnca.colour import linear_to_srgb, srgb_to_linear
-from vnca.errors import OptionError, ShapeError
+from vnca.core.colour import linear_to_srgb, srgb_to_linear
+from vnca.core.errors import OptionError, ShapeError
+from vnca.core.typing import FloatArray
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
 from vnca.losses.appearance import Appearance, AppearanceConfig, AppearanceLoss
 from vnca.losses.pixels import luminance
-from vnca.typing import FloatArray
 
 SIZE = 48
 # The deeper ones take most of the time.

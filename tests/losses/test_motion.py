@@ -3,7 +3,7 @@ import dataclasses
 import pytest
 import torch
 
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
 from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss, supervised
 
 CONFIG = MotionConfig()

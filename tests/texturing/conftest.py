@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.automaton.rule import Rule, RuleConfig
-from vnca.automaton.stepper import Step, stepper
+from vnca.core.typing import FloatArray
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig
-from vnca.texturing.config import SliceConfig, TextureConfig
-from vnca.texturing.training import initial_rule
-from vnca.typing import FloatArray
+from vnca.rule.rule import Rule, RuleConfig
+from vnca.rule.stepper import Step, stepper
+from vnca.training.texture_config import SliceConfig, TextureConfig
+from vnca.training.texture_trainer import initial_rule
 
 
 @pytest.fixture(scope="session")

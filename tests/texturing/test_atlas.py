@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from vnca.errors import BackendUnavailableError, GridError
-from vnca.io.mesh import Mesh, read_mesh
-from vnca.io.mesh_texture import Unwrapping
-from vnca.texturing.atlas import GUTTER, texel_map, unwrapped
+from vnca.core.errors import BackendUnavailableError, GridError
+from vnca.io.mesh.mesh import Mesh, read_mesh
+from vnca.io.mesh.texture import Unwrapping
+from vnca.meshes.unwrap import GUTTER, texel_map, unwrapped
 
 
 def opened(tmp_path: Path, mesh: trimesh.Trimesh) -> Mesh:

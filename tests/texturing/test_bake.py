@@ -5,14 +5,14 @@ import pytest
 import trimesh
 from PIL import Image
 
-from vnca.errors import OptionError
-from vnca.io.mesh import Mesh, read_mesh
-from vnca.io.mesh_texture import BaseColour
-from vnca.texturing.atlas import TexelMap, unwrapped
-from vnca.texturing.bake import Placement, bake, fill, to_png
-from vnca.texturing.block import sample_block
-from vnca.texturing.turntable import read_picture
-from vnca.typing import FloatArray
+from vnca.core.errors import OptionError
+from vnca.core.typing import FloatArray
+from vnca.io.mesh.mesh import Mesh, read_mesh
+from vnca.io.mesh.texture import BaseColour
+from vnca.meshes.bake import Placement, bake, fill, to_png
+from vnca.meshes.turntable import read_picture
+from vnca.meshes.unwrap import TexelMap, unwrapped
+from vnca.painting.block import sample_block
 
 
 @pytest.fixture(scope="module")

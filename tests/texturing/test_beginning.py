@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vnca.automaton.rule import PRIORS, Rule, Scales
 from vnca.losses.appearance import AppearanceConfig
-from vnca.texturing.beginning import LARGEST_PICTURE, SHARES, beginning_config, deaf_to_priors
-from vnca.training.config import PRESETS
+from vnca.rule.rule import PRIORS, Rule, Scales
+from vnca.training.pretraining import LARGEST_PICTURE, SHARES, beginning_config, deaf_to_priors
+from vnca.training.smoke_config import PRESETS
 
 
 def test_the_texture_is_of_the_rule_and_the_picture_that_smoke_is_trained_with() -> None:

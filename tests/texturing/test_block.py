@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from vnca.automaton.rule import Rule
-from vnca.automaton.stepper import Step
-from vnca.errors import OptionError
-from vnca.texturing.block import block_domain, border_jump, grow, sample_block
-from vnca.typing import FloatArray
+from vnca.core.errors import OptionError
+from vnca.core.typing import FloatArray
+from vnca.painting.block import block_domain, border_jump, grow, sample_block
+from vnca.rule.rule import Rule
+from vnca.rule.stepper import Step
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,11 @@ from collections.abc import Callable
 
 import pytest
 
-from vnca.automaton.rule import RuleConfig
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
 from vnca.losses.appearance import AppearanceConfig
-from vnca.texturing.config import PRESETS, SliceConfig, TextureConfig
-from vnca.training.course import PoolConfig
+from vnca.rule.rule import RuleConfig
+from vnca.training.config import PoolConfig
+from vnca.training.texture_config import PRESETS, SliceConfig, TextureConfig
 
 
 def test_presets_tell_cells_nothing() -> None:

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from vnca.core.typing import FloatArray
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceLoss
-from vnca.texturing.config import TextureConfig
-from vnca.texturing.distance import slice_distances
-from vnca.typing import FloatArray
+from vnca.metrics.slice_distance import slice_distances
+from vnca.training.texture_config import TextureConfig
 
 
 @pytest.fixture(scope="module")

@@ -4,10 +4,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.camera import Orthographic
-from vnca.texturing import raster
-from vnca.texturing.raster import fragments, visible, weights_at
-from vnca.typing import AnyArray
+from vnca.core.camera import Orthographic
+from vnca.core.typing import AnyArray
+from vnca.meshes import raster
+from vnca.meshes.raster import fragments, visible, weights_at
 
 
 def covered(corners: AnyArray, rows: int, columns: int) -> AnyArray:

@@ -5,9 +5,9 @@ import pytest
 import torch
 import trimesh
 
-from vnca.io.mesh import read_mesh
-from vnca.texturing.config import SliceConfig
-from vnca.texturing.scene import BlockScene, mesh_views
+from vnca.io.mesh.mesh import read_mesh
+from vnca.training.scenes.texture import BlockScene, mesh_views
+from vnca.training.texture_config import SliceConfig
 
 BACKGROUND = torch.tensor([0.1, 0.2, 0.3])
 

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.camera import view_axes
-from vnca.texturing.block import sample_block
-from vnca.texturing.slices import (
+from vnca.core.camera import view_axes
+from vnca.core.typing import FloatArray
+from vnca.painting.block import sample_block
+from vnca.training.scenes.slices import (
     DIAGONAL,
     FAMILIES,
     UNSEEN,
@@ -13,7 +14,6 @@ from vnca.texturing.slices import (
     shown,
     slice_points,
 )
-from vnca.typing import FloatArray
 
 
 @pytest.fixture(scope="module")

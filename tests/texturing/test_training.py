@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.automaton.rule import DENSITY_CHANGE
+from vnca.core.typing import FloatArray
 from vnca.features.load import load_network
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig
-from vnca.texturing.config import TextureConfig
-from vnca.texturing.training import texture_trainer
-from vnca.training.course import PoolConfig
+from vnca.rule.rule import DENSITY_CHANGE
+from vnca.training.config import PoolConfig
 from vnca.training.loop import Trainer
 from vnca.training.preview import preview_sheet
 from vnca.training.scene import Scene
-from vnca.typing import FloatArray
+from vnca.training.texture_config import TextureConfig
+from vnca.training.texture_trainer import texture_trainer
 
 Make = Callable[..., Trainer]
 

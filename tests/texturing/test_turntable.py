@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from vnca.errors import OptionError
-from vnca.io.mesh import read_mesh
-from vnca.io.mesh_texture import put_on
-from vnca.texturing.atlas import unwrapped
-from vnca.texturing.bake import Placement, bake, to_png
-from vnca.texturing.turntable import Turntable, TurntableConfig, solid, textured
-from vnca.typing import FloatArray
+from vnca.core.errors import OptionError
+from vnca.core.typing import FloatArray
+from vnca.io.mesh.mesh import read_mesh
+from vnca.io.mesh.texture import put_on
+from vnca.meshes.bake import Placement, bake, to_png
+from vnca.meshes.turntable import Turntable, TurntableConfig, solid, textured
+from vnca.meshes.unwrap import unwrapped
 
 FILM = TurntableConfig(rows=48, columns=64, frames=4)
 

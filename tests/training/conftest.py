@@ -5,12 +5,12 @@ from importlib.resources import files
 import pytest
 from PIL import Image
 
-from vnca.automaton.rule import RuleConfig
+from vnca.core.typing import FloatArray
 from vnca.features.vgg import VGG16
-from vnca.io.image import fit, read_image
+from vnca.io.picture import fit, read_image
 from vnca.losses.appearance import AppearanceConfig
-from vnca.training.config import TrainConfig, ViewConfig
-from vnca.typing import FloatArray
+from vnca.rule.rule import RuleConfig
+from vnca.training.smoke_config import TrainConfig, ViewConfig
 
 
 @pytest.fixture(scope="session")

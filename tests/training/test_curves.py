@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from vnca.errors import OutputError
+from vnca.core.errors import OutputError
 from vnca.training.curves import PATTERN, Curves
 
 accumulating = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.errors import DivergenceError
+from vnca.core.errors import DivergenceError
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import Appearance, AppearanceLoss
-from vnca.training.config import TrainConfig
 from vnca.training.descent import KEEP_EVERY, MOST_RETREATS, PATIENCE, Descent
 from vnca.training.loop import Trainer
-from vnca.training.smoke import smoke_trainer
-from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_trainer import smoke_trainer
 
 NAN = torch.tensor(torch.nan)
 

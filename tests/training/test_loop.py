@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 import torch
 
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import Appearance, AppearanceLoss
 from vnca.losses.motion import MotionConfig
-from vnca.training.config import TrainConfig
-from vnca.training.course import PoolConfig
+from vnca.training.config import PoolConfig
 from vnca.training.loop import Trainer
 from vnca.training.preview import preview_sheet
 from vnca.training.scene import Scene
-from vnca.training.smoke import smoke_trainer
-from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_trainer import smoke_trainer
 
 Make = Callable[..., Trainer]
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 import pytest
 import torch
 
-from vnca.automaton.rule import Rule, Scales
-from vnca.errors import OptionError
-from vnca.training.config import PRESETS, TrainConfig, ViewConfig
-from vnca.training.course import PoolConfig
+from vnca.core.errors import OptionError
+from vnca.core.volume import Volume
+from vnca.rule.rule import Rule, Scales
+from vnca.training.config import PoolConfig
 from vnca.training.memory import (
     SAMPLE_BYTES,
     is_out_of_memory,
@@ -19,8 +19,8 @@ from vnca.training.memory import (
     states_to_keep,
 )
 from vnca.training.rollout import fewest_kept
-from vnca.training.smoke_scene import SmokeScene
-from vnca.volume import Volume
+from vnca.training.scenes.smoke import SmokeScene
+from vnca.training.smoke_config import PRESETS, TrainConfig, ViewConfig
 
 CPU = torch.device("cpu")
 MANY = replace(PRESETS["draft"], longest_rollout=64, view=ViewConfig(size=32))

@@ -5,14 +5,14 @@ import pytest
 import torch
 from torch.nn import functional
 
-from vnca.automaton.rule import Rule, RuleConfig, Scales
+from vnca.core.volume import Volume
 from vnca.features.flow import FlowNetwork
 from vnca.losses.motion import Motion, MotionConfig
-from vnca.training.config import ViewConfig
+from vnca.rule.rule import Rule, RuleConfig, Scales
 from vnca.training.motion import MotionSupervision, _shrunk
-from vnca.training.smoke_scene import SmokeScene
+from vnca.training.scenes.smoke import SmokeScene
+from vnca.training.smoke_config import ViewConfig
 from vnca.training.snapshot import Snapshot
-from vnca.volume import Volume
 
 CONFIG = MotionConfig(weight=0.5, balance_over=3)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.training.course import PoolConfig
+from vnca.training.config import PoolConfig
 from vnca.training.pool import Pool
 
 SEED = torch.zeros(5, 4)

@@ -6,15 +6,15 @@ import pytest
 import torch
 from torch import Tensor
 
-from vnca.automaton.rule import Rule
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceLoss
-from vnca.render.colour import linear_to_srgb
-from vnca.training.config import PRESETS, TrainConfig
-from vnca.training.smoke import choose_scales, smoke_trainer
-from vnca.training.smoke_scene import SmokeScene
-from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.rendering.colour import linear_to_srgb
+from vnca.rule.rule import Rule
+from vnca.training.scenes.smoke import SmokeScene
+from vnca.training.smoke_config import PRESETS, TrainConfig
+from vnca.training.smoke_trainer import choose_scales, smoke_trainer
 
 GREY = 0.214
 """Linear, of sRGB ½."""

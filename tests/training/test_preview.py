@@ -1,12 +1,12 @@
 import numpy as np
 
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
-from vnca.training.config import TrainConfig
 from vnca.training.preview import SIZE, preview_sheet
-from vnca.training.smoke import smoke_trainer
-from vnca.training.smoke_scene import PORTRAITS
-from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.training.scenes.smoke import PORTRAITS
+from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_trainer import smoke_trainer
 
 
 def test_a_preview_shows_the_style_and_every_view(

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from vnca.automaton.domain import Domain
-from vnca.kernels.update.backend import torch_step
-from vnca.kernels.update.mask import changing_rows
-from vnca.kernels.update.reference import Weights
-from vnca.kernels.update.stencil import stencil
+from vnca.engine.backend import torch_step
+from vnca.engine.domain import Domain
+from vnca.engine.mask import changing_rows
+from vnca.engine.reference.step import Weights
+from vnca.engine.stencil import stencil
 from vnca.training.rollout import fewest_kept, layout, roll_out
 
 

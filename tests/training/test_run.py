@@ -4,12 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule, RuleConfig, Scales
-from vnca.errors import OutputError
-from vnca.training.config import TrainConfig
+from vnca.core.errors import OutputError
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule, RuleConfig, Scales
 from vnca.training.loop import Progress
 from vnca.training.run import RunFolder
+from vnca.training.smoke_config import TrainConfig
 
 MODEL = Model(Rule.initial(RuleConfig(channels=4, hidden=2), Scales(), seed=0))
 

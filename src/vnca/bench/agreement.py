@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from vnca.errors import DisagreementError
+from vnca.core.errors import DisagreementError
 
 
 class Difference(NamedTuple):

@@ -8,11 +8,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from vnca.automaton.domain import Domain
-from vnca.automaton.rule import PRIORS
-from vnca.kernels.update.mask import changing_rows
-from vnca.kernels.update.stencil import FILTERS
-from vnca.typing import AnyArray, BoolArray, FloatArray, Index, IntArray
+from vnca.core.typing import AnyArray, BoolArray, FloatArray, Index, IntArray
+from vnca.engine.domain import Domain
+from vnca.engine.mask import changing_rows
+from vnca.engine.stencil import FILTERS
+from vnca.rule.rule import PRIORS
 
 CHANNELS, PROBABILITY = 12, 0.5
 

@@ -7,14 +7,14 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from vnca.automaton.rule import PRIORS
 from vnca.bench.cases import CHANNELS, Case, Place
 from vnca.bench.plain import Grid, depthwise, input_order, plain_step
-from vnca.errors import BackendUnavailableError, OptionError
-from vnca.kernels.update import native
-from vnca.kernels.update.backend import choose, torch_step
-from vnca.kernels.update.reference import Weights
-from vnca.kernels.update.stencil import stencil
+from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.engine.backend import choose, torch_step
+from vnca.engine.native import step as native
+from vnca.engine.reference.step import Weights
+from vnca.engine.stencil import stencil
+from vnca.rule.rule import PRIORS
 
 BACKENDS = ("plain", "compile", "reference", "native", "triton")
 """`compile` is `plain` under `torch.compile`."""

@@ -9,9 +9,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from vnca.automaton.domain import Domain
-from vnca.kernels.update.reference import Weights
-from vnca.kernels.update.stencil import FILTERS
+from vnca.engine.domain import Domain
+from vnca.engine.reference.step import Weights
+from vnca.engine.stencil import FILTERS
 
 
 def plain_step(
@@ -104,7 +104,7 @@ class PlainUpdate:
         weights: Weights,
         stencil: Tensor,
     ) -> Tensor:
-        """As `vnca.kernels.update.reference.update`; `neighbours` are those of the domain."""
+        """As `vnca.engine.reference.step.update`; `neighbours` are those of the domain."""
         if self._known is None or self._known[0] is not priors:
             self._known = priors, self._grid.spread(priors)
         channels = state.shape[1]

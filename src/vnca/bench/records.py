@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from vnca.errors import FileFormatError
-from vnca.files import existing_file, whole_file
+from vnca.core.errors import FileFormatError
+from vnca.core.files import existing_file, whole_file
 
 Row = Mapping[str, Any]
 

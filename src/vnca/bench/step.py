@@ -13,7 +13,6 @@ from typing import Any, Literal, NamedTuple
 
 import torch
 
-from vnca.automaton.rule import PRIORS
 from vnca.bench.agreement import Difference, require_agreement
 from vnca.bench.cases import CHANNELS, Case, Place
 from vnca.bench.contenders import DTYPES, PASSES, Contender, available, contender, require
@@ -21,10 +20,11 @@ from vnca.bench.machine import run_facts
 from vnca.bench.memory import peak_mb
 from vnca.bench.peaks import copying, gemm
 from vnca.bench.timing import Spread, in_turns
-from vnca.errors import OptionError
-from vnca.kernels.update.native import default_threads
-from vnca.kernels.update.stencil import NEIGHBOURS
-from vnca.typing import Index
+from vnca.core.errors import OptionError
+from vnca.core.typing import Index
+from vnca.engine.native.step import default_threads
+from vnca.engine.stencil import NEIGHBOURS
+from vnca.rule.rule import PRIORS
 
 ARRAYS = ("state", "gradient of the state", "gradient of W1", "gradient of b1", "gradient of W2")
 TOLERANCES = {
@@ -231,7 +231,7 @@ def measure(entries: Sequence[Entry], config: StepConfig, dtype: str) -> StepRun
 
 
 def needed_flop(hidden: int) -> dict[str, int]:
-    """Of the matrix products, per changed cell; derived in `vnca/kernels/update/README.md`."""
+    """Of the matrix products, per changed cell; derived in `vnca/engine/README.md`."""
     forward = 2 * hidden * (6 * CHANNELS + PRIORS)
     backward = 2 * hidden * (12 * CHANNELS + PRIORS)
     return {"forward": forward, "backward": backward, "both": forward + backward}

@@ -11,24 +11,24 @@ from typing import Any
 
 import numpy as np
 
-from vnca.automaton.rule import Rule, RuleConfig, Scales
-from vnca.automaton.stepper import stepper
 from vnca.bench.agreement import Difference, require_agreement
 from vnca.bench.memory import peak_mb
 from vnca.bench.timing import Spread, in_turns
-from vnca.errors import BackendUnavailableError
+from vnca.core.errors import BackendUnavailableError
+from vnca.core.lattice import Lattice
+from vnca.core.typing import Box, FloatArray
+from vnca.core.volume import Volume
+from vnca.engine.backend import choose
+from vnca.engine.native.step import Precision
 from vnca.io.orientation import on_one_lattice
 from vnca.io.sequence import FrameSequence, find_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
-from vnca.kernels.update.backend import choose
-from vnca.kernels.update.native import Precision
-from vnca.lattice import Lattice
-from vnca.simulate.scenes import simulate
-from vnca.stylize.config import StylizeConfig
-from vnca.stylize.painter import Painter
-from vnca.stylize.roll import Roll
-from vnca.typing import Box, FloatArray
-from vnca.volume import Volume
+from vnca.painting.config import StylizeConfig
+from vnca.painting.painter import Painter
+from vnca.painting.roll import Roll
+from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.rule.stepper import stepper
+from vnca.simulation.scenes import simulate
 
 BACKENDS = ("native", "reference")
 TOLERANCES: dict[Precision, float] = {"float32": 1e-3, "bfloat16": 5e-2}

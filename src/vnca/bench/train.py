@@ -17,12 +17,12 @@ from vnca.bench.agreement import Difference, require_agreement
 from vnca.bench.memory import peak_mb
 from vnca.bench.plain import PlainUpdate
 from vnca.bench.timing import Spread
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
 from vnca.features.network import FeatureNetwork
-from vnca.training.config import TrainConfig
 from vnca.training.loop import Trainer
-from vnca.training.smoke import smoke_trainer
-from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_trainer import smoke_trainer
 
 PLAIN = ("plain", "compile")
 WARMUP = 2

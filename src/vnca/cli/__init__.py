@@ -9,7 +9,7 @@ import vnca
 from vnca.cli.progress import end_line
 from vnca.cli.subcommands import usage
 from vnca.cli.termination import terminable
-from vnca.errors import Terminated, VncaError
+from vnca.core.errors import Terminated, VncaError
 
 COMMANDS = {
     "demo": "simulate, train, stylize and film a small plume, from nothing",

@@ -9,9 +9,9 @@ from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, Pri
 
 from vnca.bench.records import append_csv, write_json
 from vnca.cli.options import parse
-from vnca.errors import OptionError
-from vnca.files import writable_file
-from vnca.typing import Index
+from vnca.core.errors import OptionError
+from vnca.core.files import writable_file
+from vnca.core.typing import Index
 
 T = TypeVar("T")
 Rows = Sequence[Mapping[str, Any]]

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import tyro
 
-from vnca.automaton.model import Model
 from vnca.bench.machine import run_facts
 from vnca.bench.stylize import (
     BACKENDS,
@@ -21,10 +20,11 @@ from vnca.bench.stylize import (
 from vnca.cli.bench_options import Rows, Tables, parse_bench, short
 from vnca.cli.options import say
 from vnca.cli.sequence import open_sequence
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
+from vnca.engine.backend import array_step
+from vnca.engine.native.step import Precision, default_threads
 from vnca.io.smoke import SmokeFormat, with_fitted_scale
-from vnca.kernels.update.backend import array_step
-from vnca.kernels.update.native import Precision, default_threads
+from vnca.rule.model import Model
 
 
 @dataclass(frozen=True)

@@ -17,16 +17,16 @@ from vnca.cli.demo import STYLE
 from vnca.cli.options import say
 from vnca.cli.sequence import beside, read_alone
 from vnca.cli.session import choose_device
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
+from vnca.engine.native.step import default_threads
 from vnca.features.load import load_network
-from vnca.io.image import read_style
+from vnca.io.picture import read_style
 from vnca.io.smoke import SmokeFormat
-from vnca.kernels.update.native import default_threads
-from vnca.simulate.scenes import simulate
-from vnca.training.config import PRESETS, TrainConfig
+from vnca.simulation.scenes import simulate
 from vnca.training.memory import memory_budget
-from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.training.smoke_config import PRESETS, TrainConfig
 
 _FRAME = 30
 """Of the simulated plume: it has risen through most of its box."""

@@ -13,10 +13,10 @@ from vnca.cli.sequence import open_sequence
 from vnca.cli.simulate import Simulate, write_simulation
 from vnca.cli.stylize import Stylize, paint
 from vnca.cli.train import Train, train
-from vnca.io.image import fit, read_style, write_image
+from vnca.core.typing import FloatArray
+from vnca.io.picture import fit, read_style, write_image
 from vnca.io.sheet import contact_sheet
-from vnca.training.config import PRESETS, TrainConfig
-from vnca.typing import FloatArray
+from vnca.training.smoke_config import PRESETS, TrainConfig
 
 STYLE = "vangogh_cafe_terrace.webp"
 """A painting in the package, in the public domain."""

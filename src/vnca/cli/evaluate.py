@@ -11,30 +11,30 @@ from typing import Annotated, Any, Literal
 import tyro
 
 import vnca
-from vnca.automaton.model import Model
-from vnca.automaton.stepper import stepper
 from vnca.bench.machine import run_facts
 from vnca.cli.options import is_given, parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.recorded import PICTURE_CELLS, recorded_smoke
 from vnca.cli.sequence import open_sequence, placed, sequence_region, volumes
-from vnca.errors import BackendUnavailableError, OptionError
-from vnca.evaluation.judges import Judge
-from vnca.evaluation.measures import Measure, measures
-from vnca.evaluation.report import report
-from vnca.evaluation.stage import SIZE, Stage
-from vnca.evaluation.style import SMALLEST, StyleGauge
-from vnca.evaluation.survey import survey
+from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.files import whole_file, writable_folder
+from vnca.core.typing import FloatArray
 from vnca.features.load import load_network
-from vnca.files import whole_file, writable_folder
-from vnca.io.image import read_image
+from vnca.io.picture import read_image
 from vnca.io.sequence import format_frames
 from vnca.io.smoke import SmokeFormat, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY
-from vnca.stylize.config import StylizeConfig
-from vnca.stylize.roll import stylize
+from vnca.metrics.judges import Judge
+from vnca.metrics.measures import Measure, measures
+from vnca.metrics.report import report
+from vnca.metrics.stage import SIZE, Stage
+from vnca.metrics.style import SMALLEST, StyleGauge
+from vnca.metrics.survey import survey
+from vnca.painting.config import StylizeConfig
+from vnca.painting.roll import stylize
+from vnca.rule.model import Model
+from vnca.rule.stepper import stepper
 from vnca.training.run import CONFIG_NAME
-from vnca.typing import FloatArray
 
 REPORT_NAME = "report.html"
 MEASURES_NAME = "report.json"

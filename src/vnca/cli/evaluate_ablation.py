@@ -11,28 +11,28 @@ import numpy as np
 import tyro
 
 import vnca
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule
 from vnca.cli.options import chosen, parse, say
 from vnca.cli.sequence import beside, read_alone
 from vnca.cli.session import FINGERPRINTS, choose_device
 from vnca.cli.train import Train, train, training_inputs
-from vnca.errors import OptionError
-from vnca.evaluation.estimators import Estimator, estimators
-from vnca.evaluation.motion import (
+from vnca.core.errors import OptionError
+from vnca.core.files import existing_file, whole_file, writable_file
+from vnca.core.volume import Volume
+from vnca.features.vgg import VGG16
+from vnca.io.picture import read_image
+from vnca.io.smoke import SmokeFormat
+from vnca.metrics.estimators import Estimator, estimators
+from vnca.metrics.motion import (
     MotionMeasures,
     measure_carried_noise,
     measure_drift,
     measure_motion,
 )
-from vnca.features.vgg import VGG16
-from vnca.files import existing_file, whole_file, writable_file
-from vnca.io.image import read_image
-from vnca.io.smoke import SmokeFormat
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule
 from vnca.training.checkpoint import CHECKPOINT_NAME
-from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.run import CONFIG_NAME
-from vnca.volume import Volume
+from vnca.training.smoke_config import PRESETS, TrainConfig
 
 
 @dataclass(frozen=True)

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vnca.camera import frame_box
-from vnca.colour import srgb_to_linear
-from vnca.errors import BackendUnavailableError, OptionError
-from vnca.io.video import FilmWriter
-from vnca.typing import AnyArray, FloatArray
-from vnca.volume import Volume
+from vnca.core.camera import frame_box
+from vnca.core.colour import srgb_to_linear
+from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.typing import AnyArray, FloatArray
+from vnca.core.volume import Volume
+from vnca.io.film import FilmWriter
 
 if TYPE_CHECKING:
     import torch
 
-    from vnca.render.view import View
+    from vnca.rendering.view import View
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Film:
             OutputError: If the film cannot be written.
         """
         try:
-            import vnca.render.view  # noqa: F401  A missing torch is best told before long work.
+            import vnca.rendering.view  # noqa: F401  A missing torch is best told before long work.
         except ModuleNotFoundError as error:
             raise BackendUnavailableError(
                 f"films need {error.name}: pip install 'vnca[train]'"
@@ -153,7 +153,7 @@ def picture(
     """The view of one frame by a camera framed on `bounds` that has turned by some degrees."""
     import torch
 
-    from vnca.render.view import render
+    from vnca.rendering.view import render
 
     density, colour, place = frame.smoke.density, frame.colour, frame.smoke.cells_to_world
     # In lengths of a cell, single precision has room for a world of any size.

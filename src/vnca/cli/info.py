@@ -8,11 +8,11 @@ from typing import Annotated
 
 import tyro
 
-from vnca.automaton.model import MODEL_NAME, Model
 from vnca.cli.options import parse
-from vnca.errors import FileFormatError, printable
-from vnca.files import existing_file
+from vnca.core.errors import FileFormatError, printable
+from vnca.core.files import existing_file
 from vnca.io.vdb import GridHeader, open_vdb
+from vnca.rule.model import MODEL_NAME, Model
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from vnca.automaton.model import Model, from_record
-from vnca.errors import ModelError
+from vnca.core.errors import ModelError
 from vnca.io.smoke_format import SmokeFormat
+from vnca.rule.model import Model, from_record
 
 PICTURE_CELLS = "picture_cells"
 """What says in a model how many cells wide the rule was shown its picture, the shorter side."""

@@ -15,19 +15,19 @@ from vnca.cli.film import Bounds, Film, FilmConfig, Shown, parse_colour, picture
 from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.sequence import open_sequence, sequence_bounds, volumes
-from vnca.errors import OptionError
-from vnca.files import existing_file, writable_file
-from vnca.io.image import SUFFIXES as PICTURES
-from vnca.io.image import write_image
+from vnca.core.errors import OptionError
+from vnca.core.files import existing_file, writable_file
+from vnca.core.typing import FloatArray
+from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.painted import read_colour
+from vnca.io.picture import SUFFIXES as PICTURES
+from vnca.io.picture import write_image
 from vnca.io.provenance import read_provenance
 from vnca.io.sequence import FrameSequence
 from vnca.io.sheet import contact_sheet
 from vnca.io.smoke import SmokeFormat
 from vnca.io.smoke_format import NO_VELOCITY
-from vnca.io.video import SUFFIXES as FILMS
-from vnca.render.brightness import gamma_for_cell_opacity
-from vnca.typing import FloatArray
+from vnca.rendering.brightness import gamma_for_cell_opacity
 
 TRANSPARENT = (".png", ".exr")
 """Pictures that can go without a background."""

@@ -8,20 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
-from vnca.automaton.rule import SMOKE_THRESHOLD, Rule, density_scale
-from vnca.camera import world_box
 from vnca.cli.options import say
-from vnca.errors import SequenceError
-from vnca.files import existing_file
+from vnca.core.camera import world_box
+from vnca.core.errors import SequenceError
+from vnca.core.files import existing_file
+from vnca.core.lattice import Lattice, Placement, Region
+from vnca.core.typing import AnyArray, Box
+from vnca.core.volume import Volume
 from vnca.io.orientation import on_lattice
 from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY, Extent
-from vnca.lattice import Lattice, Placement, Region
-from vnca.stylize.ahead import read_ahead
-from vnca.stylize.painter import BROKEN
-from vnca.typing import AnyArray, Box
-from vnca.volume import Volume
+from vnca.painting.ahead import read_ahead
+from vnca.painting.painter import BROKEN
+from vnca.rule.rule import SMOKE_THRESHOLD, Rule, density_scale
 
 
 def open_sequence(pattern: str, frames: str | None) -> FrameSequence:

@@ -10,26 +10,26 @@ from typing import Any, TypeVar
 
 import torch
 
-from vnca.automaton.model import MODEL_NAME, Model
 from vnca.cli.options import say
 from vnca.cli.progress import Progress
 from vnca.cli.recorded import PICTURE_CELLS, recorded, restored
-from vnca.errors import (
+from vnca.core.errors import (
     DivergenceError,
     FileFormatError,
     OptionError,
     OutOfMemoryError,
     VncaError,
 )
+from vnca.core.typing import FloatArray
 from vnca.features.network import FeatureNetwork
-from vnca.io.image import resize, to_srgb8
+from vnca.io.picture import resize, to_srgb8
+from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
-from vnca.training.course import CourseConfig
+from vnca.training.config import CourseConfig
 from vnca.training.loop import Trainer
 from vnca.training.memory import is_out_of_memory, memory_advice, memory_budget
 from vnca.training.preview import preview_sheet
 from vnca.training.run import RunFolder
-from vnca.typing import FloatArray
 
 FINGERPRINTS = "fingerprints"
 """What says in the configuration of a run what its inputs were, wherever their files lie."""

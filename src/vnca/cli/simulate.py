@@ -9,10 +9,10 @@ import tyro
 
 from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
-from vnca.errors import OptionError
-from vnca.files import writable_folder
+from vnca.core.errors import OptionError
+from vnca.core.files import writable_folder
 from vnca.io.smoke import write_smoke
-from vnca.simulate.scenes import simulate
+from vnca.simulation.scenes import simulate
 
 
 @dataclass(frozen=True)

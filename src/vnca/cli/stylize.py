@@ -13,9 +13,6 @@ from typing import Annotated, Any, Literal
 import tyro
 
 import vnca
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule
-from vnca.automaton.stepper import stepper
 from vnca.cli.film import Film, FilmConfig, Shown
 from vnca.cli.options import parse, say
 from vnca.cli.progress import Progress
@@ -28,19 +25,22 @@ from vnca.cli.sequence import (
     sequence_region,
 )
 from vnca.cli.termination import finishing
-from vnca.errors import BackendUnavailableError, OptionError
-from vnca.files import remove_leftovers, writable_file, writable_folder
+from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.files import remove_leftovers, writable_file, writable_folder
+from vnca.core.volume import refined_transform
+from vnca.engine.backend import choose
+from vnca.engine.native.step import Precision
+from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.painted import read_colour
 from vnca.io.provenance import read_provenance
 from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
-from vnca.io.video import SUFFIXES as FILMS
-from vnca.kernels.update.backend import choose
-from vnca.kernels.update.native import Precision
-from vnca.stylize.config import StylizeConfig
-from vnca.stylize.painter import OnError, Painter
-from vnca.stylize.roll import Roll
-from vnca.volume import refined_transform
+from vnca.painting.config import StylizeConfig
+from vnca.painting.painter import OnError, Painter
+from vnca.painting.roll import Roll
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule
+from vnca.rule.stepper import stepper
 
 
 @dataclass(frozen=True)

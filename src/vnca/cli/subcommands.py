@@ -3,7 +3,7 @@
 import importlib
 from collections.abc import Mapping, Sequence
 
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
 
 Commands = Mapping[str, str]
 """What each does, by name."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from vnca.errors import Terminated
+from vnca.core.errors import Terminated
 
 
 @contextmanager

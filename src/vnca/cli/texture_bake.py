@@ -8,18 +8,18 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from vnca.automaton.rule import Rule
 from vnca.cli.options import parse, say
 from vnca.cli.texture_block import BlockConfig, grown_blocks, texture_rule
-from vnca.errors import OptionError
-from vnca.files import whole_file, writable_file
-from vnca.io.image import to_srgb8
-from vnca.io.mesh import Mesh, read_mesh
-from vnca.io.mesh_texture import put_on, write_coloured
+from vnca.core.errors import OptionError
+from vnca.core.files import whole_file, writable_file
+from vnca.io.mesh.mesh import Mesh, read_mesh
+from vnca.io.mesh.texture import put_on, write_coloured
 from vnca.io.orientation import UpAxis
-from vnca.texturing.atlas import Unwrap, unwrapped
-from vnca.texturing.bake import Placement, bake, to_png
-from vnca.texturing.block import sample_block
+from vnca.io.picture import to_srgb8
+from vnca.meshes.bake import Placement, bake, to_png
+from vnca.meshes.unwrap import Unwrap, unwrapped
+from vnca.painting.block import sample_block
+from vnca.rule.rule import Rule
 
 SUFFIXES = (".glb", ".ply")
 MANY_FACES = 200_000

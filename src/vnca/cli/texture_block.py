@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from vnca.automaton.model import Model
-from vnca.automaton.rule import Rule
-from vnca.automaton.stepper import Step, stepper
 from vnca.cli.options import say
 from vnca.cli.progress import Progress
-from vnca.errors import OptionError
-from vnca.texturing.block import LARGEST, SMALLEST, grow
-from vnca.typing import FloatArray, IntArray
+from vnca.core.errors import OptionError
+from vnca.core.typing import FloatArray, IntArray
+from vnca.painting.block import LARGEST, SMALLEST, grow
+from vnca.rule.model import Model
+from vnca.rule.rule import Rule
+from vnca.rule.stepper import Step, stepper
 
 KIND = "texture"
 """What the model of a solid texture says it is, under `kind` in its record of training."""

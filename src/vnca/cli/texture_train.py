@@ -21,15 +21,15 @@ from vnca.cli.session import (
     shown_and_judged,
 )
 from vnca.cli.texture_block import KIND
+from vnca.core.typing import AnyArray
 from vnca.features.load import load_network
-from vnca.io.image import read_style
-from vnca.io.mesh import Mesh, read_mesh
+from vnca.io.mesh.mesh import Mesh, read_mesh
 from vnca.io.orientation import UpAxis
-from vnca.texturing.config import PRESETS, TextureConfig
-from vnca.texturing.training import texture_trainer
+from vnca.io.picture import read_style
 from vnca.training.checkpoint import Checkpoint, fingerprints
 from vnca.training.memory import memory_budget
-from vnca.typing import AnyArray
+from vnca.training.texture_config import PRESETS, TextureConfig
+from vnca.training.texture_trainer import texture_trainer
 
 COMMAND = "texture train"
 

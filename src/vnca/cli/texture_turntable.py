@@ -11,16 +11,16 @@ import tyro
 from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.texture_block import BlockConfig, grown_blocks, texture_rule
-from vnca.errors import OptionError
-from vnca.files import writable_file
-from vnca.io.image import SUFFIXES as PICTURES
-from vnca.io.image import write_image
-from vnca.io.mesh import Mesh, read_mesh
+from vnca.core.errors import OptionError
+from vnca.core.files import writable_file
+from vnca.io.film import SUFFIXES as FILMS
+from vnca.io.film import FilmWriter
+from vnca.io.mesh.mesh import Mesh, read_mesh
 from vnca.io.orientation import UpAxis
-from vnca.io.video import SUFFIXES as FILMS
-from vnca.io.video import FilmWriter
-from vnca.texturing.bake import Placement
-from vnca.texturing.turntable import Shader, Turntable, TurntableConfig, solid, textured
+from vnca.io.picture import SUFFIXES as PICTURES
+from vnca.io.picture import write_image
+from vnca.meshes.bake import Placement
+from vnca.meshes.turntable import Shader, Turntable, TurntableConfig, solid, textured
 
 
 @dataclass(frozen=True)

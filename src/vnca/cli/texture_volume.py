@@ -10,10 +10,10 @@ import tyro
 
 from vnca.cli.options import parse, say
 from vnca.cli.texture_block import BlockConfig, grown_blocks, texture_rule
-from vnca.errors import OptionError
-from vnca.files import whole_file, writable_file
+from vnca.core.errors import OptionError
+from vnca.core.files import whole_file, writable_file
+from vnca.core.typing import FloatArray
 from vnca.io.vdb import Grid, Transform, write_vdb
-from vnca.typing import FloatArray
 
 SUFFIXES = (".vdb", ".npz")
 

@@ -9,8 +9,6 @@ from typing import Annotated, Any, Literal
 import torch
 import tyro
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule, RuleConfig
 from vnca.cli import texture_train
 from vnca.cli.options import chosen, is_given, parse, say
 from vnca.cli.sequence import beside, read_alone
@@ -25,21 +23,23 @@ from vnca.cli.session import (
     run_folder,
     shown_and_judged,
 )
-from vnca.errors import GridError, OptionError
+from vnca.core.errors import GridError, OptionError
+from vnca.core.files import remove_file
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
-from vnca.files import remove_file
-from vnca.io.image import read_style
+from vnca.io.picture import read_style
 from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY
-from vnca.texturing.beginning import SHAPE, SHARES, beginning_config, deaf_to_priors
-from vnca.texturing.config import TextureConfig
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule, RuleConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
-from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.memory import memory_budget
-from vnca.training.smoke import smoke_trainer
-from vnca.typing import FloatArray
-from vnca.volume import Volume
+from vnca.training.pretraining import SHAPE, SHARES, beginning_config, deaf_to_priors
+from vnca.training.smoke_config import PRESETS, TrainConfig
+from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.texture_config import TextureConfig
 
 COMMAND = "train"
 TEXTURE_FOLDER = "texture"

@@ -9,7 +9,7 @@ from threading import Thread
 from typing import Any
 from urllib.error import HTTPError, URLError
 
-from vnca.errors import BackendUnavailableError, OutputError
+from vnca.core.errors import BackendUnavailableError, OutputError
 from vnca.features.installed import file_sha256
 
 CONNECT_SECONDS = 5.0

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
 
-from vnca.errors import FileFormatError
+from vnca.core.errors import FileFormatError
 from vnca.features.installed import file_sha256, installed_file
 from vnca.features.network import require_fitting
 

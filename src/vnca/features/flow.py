@@ -19,8 +19,8 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.nn import functional
 
-from vnca.errors import FileFormatError, ShapeError
-from vnca.files import existing_file, whole_file
+from vnca.core.errors import FileFormatError, ShapeError
+from vnca.core.files import existing_file, whole_file
 
 SMALLEST = 32
 """Rows and columns a picture must have."""

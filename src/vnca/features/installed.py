@@ -4,7 +4,7 @@ import hashlib
 from importlib import metadata
 from pathlib import Path
 
-from vnca.errors import BackendUnavailableError
+from vnca.core.errors import BackendUnavailableError
 
 
 def installed_file(features: str, package: str, version: str, name: str) -> Path:

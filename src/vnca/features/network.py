@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from vnca.errors import OptionError, ShapeError
+from vnca.core.errors import OptionError, ShapeError
 
 SMALLEST = 32
 """Rows and columns a picture must have."""

@@ -12,8 +12,8 @@ import torch
 from scipy.ndimage import gaussian_filter
 from torch.nn import functional
 
-from vnca.colour import linear_to_srgb
-from vnca.typing import AnyArray, BoolArray, FloatArray
+from vnca.core.colour import linear_to_srgb
+from vnca.core.typing import AnyArray, BoolArray, FloatArray
 
 STROKE_CELLS = 3.0
 """Cells that a stroke spans."""

@@ -23,10 +23,10 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from vnca.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
+from vnca.core.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
+from vnca.core.files import existing_file, whole_file
 from vnca.features.download import download
 from vnca.features.installed import file_sha256, installed_file
-from vnca.files import existing_file, whole_file
 
 _WIDTHS = (64, 128, 256, 512, 512)
 

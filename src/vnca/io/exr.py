@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from vnca.colour import rec709_from
-from vnca.errors import BackendUnavailableError, FileFormatError
-from vnca.files import whole_file
-from vnca.typing import AnyArray, FloatArray
+from vnca.core.colour import rec709_from
+from vnca.core.errors import BackendUnavailableError, FileFormatError
+from vnca.core.files import whole_file
+from vnca.core.typing import AnyArray, FloatArray
 
 MAGIC = b"\x76\x2f\x31\x01"
 _LARGEST_HALF = 65504.0

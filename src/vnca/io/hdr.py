@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vnca.errors import FileFormatError
-from vnca.typing import FloatArray
+from vnca.core.errors import FileFormatError
+from vnca.core.typing import FloatArray
 
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
 _SIZE = re.compile(rb"\n(-Y ([0-9]{1,9}) \+X ([0-9]{1,9})|[-+][XY] [0-9]+ [-+][XY] [0-9]+)\n")

@@ -4,9 +4,9 @@ from itertools import product
 
 import numpy as np
 
-from vnca.bricks.field import Field
-from vnca.bricks.places import CELLS
-from vnca.typing import AnyArray, BoolArray, FloatArray
+from vnca.core.bricks.field import Field
+from vnca.core.bricks.places import CELLS
+from vnca.core.typing import AnyArray, BoolArray, FloatArray
 
 _LEAST_SHARE = 1e-6
 

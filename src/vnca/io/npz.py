@@ -20,9 +20,10 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
-from vnca.bricks.field import Field
-from vnca.errors import FileFormatError, GridError
-from vnca.files import existing_file
+from vnca.core.bricks.field import Field
+from vnca.core.errors import FileFormatError, GridError
+from vnca.core.files import existing_file
+from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.io.smoke_format import (
     NO_VELOCITY,
     NOT_WANTED,
@@ -33,7 +34,6 @@ from vnca.io.smoke_format import (
     single_precision,
     upper_grown,
 )
-from vnca.typing import AnyArray, Box, FloatArray
 
 KEY = "x"
 MOST_VALUES = 2**31

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Literal, TypeAlias
 
-from vnca.lattice import Lattice, Placement, upright_turn
-from vnca.typing import AnyArray
-from vnca.volume import Volume
+from vnca.core.lattice import Lattice, Placement, upright_turn
+from vnca.core.typing import AnyArray
+from vnca.core.volume import Volume
 
 UpAxis: TypeAlias = Literal["z", "y"]
 

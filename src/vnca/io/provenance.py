@@ -6,7 +6,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from vnca.errors import FileFormatError
+from vnca.core.errors import FileFormatError
 from vnca.io.orientation import UpAxis
 from vnca.io.vdb import Metadata, open_vdb
 

@@ -20,7 +20,7 @@ from itertools import chain
 from pathlib import Path
 from typing import NamedTuple, overload
 
-from vnca.errors import OptionError, SequenceError
+from vnca.core.errors import OptionError, SequenceError
 from vnca.io.smoke_format import UP_AXES
 
 MAX_FRAMES = 1_000_000

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from vnca.colour import luminance, srgb_to_linear
-from vnca.errors import OptionError, ShapeError
-from vnca.typing import AnyArray, FloatArray
+from vnca.core.colour import luminance, srgb_to_linear
+from vnca.core.errors import OptionError, ShapeError
+from vnca.core.typing import AnyArray, FloatArray
 
 
 def contact_sheet(

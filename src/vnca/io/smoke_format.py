@@ -6,11 +6,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vnca.bricks.field import Field
-from vnca.errors import GridError
+from vnca.core.bricks.field import Field
+from vnca.core.errors import GridError
+from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.io.orientation import UpAxis
 from vnca.io.velocity import VelocityUnits
-from vnca.typing import AnyArray, BoolArray, Box, FloatArray
 
 NO_VELOCITY = "none"
 NOT_WANTED = "--velocity-grid none says that none is wanted"

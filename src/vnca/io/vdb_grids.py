@@ -1,6 +1,6 @@
 """Grids of an OpenVDB file by what they hold: which of them are velocity, and how to list them."""
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
 from vnca.io.smoke_format import NO_VELOCITY, SmokeFormat
 from vnca.io.vdb import VALUE_TYPES, GridHeader, VdbFile
 

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vnca.bricks.field import Field
-from vnca.bricks.places import bricks_beside, sorted_bricks
-from vnca.errors import FileFormatError, GridError
+from vnca.core.bricks.field import Field
+from vnca.core.bricks.places import bricks_beside, sorted_bricks
+from vnca.core.errors import FileFormatError, GridError
+from vnca.core.typing import Box, IntArray
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
     NOT_WANTED,
@@ -22,7 +23,6 @@ from vnca.io.smoke_format import (
 from vnca.io.vdb import EMPTY_BOX, Grid, GridHeader, Transform, VdbFile, open_vdb
 from vnca.io.vdb_grids import components, listed_vectors, velocity_headers
 from vnca.io.vdb_velocity import resampled_velocity
-from vnca.typing import Box, IntArray
 
 _CELL_TOLERANCE = 1e-3
 # A small file may hold 512³ cells, in tiles or packed well, one of 500 KB 2³¹.

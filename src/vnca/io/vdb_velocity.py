@@ -7,14 +7,14 @@ from itertools import product
 
 import numpy as np
 
-from vnca.bricks.field import Field
-from vnca.bricks.places import CELLS, EDGE, bricks_beside, bricks_reached, sorted_bricks
-from vnca.errors import GridError
+from vnca.core.bricks.field import Field
+from vnca.core.bricks.places import CELLS, EDGE, bricks_beside, bricks_reached, sorted_bricks
+from vnca.core.errors import GridError
+from vnca.core.typing import AnyArray, Box
 from vnca.io.interpolation import interpolated
 from vnca.io.smoke_format import SmokeFormat, StoredVelocity, single_precision, upper_grown
 from vnca.io.vdb import GridHeader, Transform
 from vnca.io.vdb.grid import MOST_TILE_CELLS
-from vnca.typing import AnyArray, Box
 
 _BRICKS_AT_ONCE = 128
 _TOLERANCE = 1e-6

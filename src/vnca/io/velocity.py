@@ -6,12 +6,12 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from vnca.bricks.field import Field
-from vnca.bricks.growth import dilated
-from vnca.bricks.places import CELLS, EDGE
-from vnca.errors import BackendUnavailableError, GridError, OptionError
-from vnca.typing import AnyArray, Box
-from vnca.volume import Volume
+from vnca.core.bricks.field import Field
+from vnca.core.bricks.growth import dilated
+from vnca.core.bricks.places import CELLS, EDGE
+from vnca.core.errors import BackendUnavailableError, GridError, OptionError
+from vnca.core.typing import AnyArray, Box
+from vnca.core.volume import Volume
 
 VelocityUnits: TypeAlias = Literal["cells/frame", "m/s", "mantaflow"]
 UNITS: tuple[VelocityUnits, ...] = ("cells/frame", "m/s", "mantaflow")

@@ -10,14 +10,14 @@ from jaxtyping import Float, Int
 from torch import Tensor
 from torch.nn import functional
 
-from vnca.errors import OptionError, ShapeError
+from vnca.core.errors import OptionError, ShapeError
+from vnca.core.typing import FloatArray
 from vnca.features.network import FeatureNetwork
 from vnca.features.strokes import picture_cells
 from vnca.losses.moments import Moments, moment_distance, moments
 from vnca.losses.pixels import luminance, palette_distance
 from vnca.losses.style import sample_positions, style_distance
-from vnca.render.colour import linear_to_srgb
-from vnca.typing import FloatArray
+from vnca.rendering.colour import linear_to_srgb
 
 
 @dataclass(frozen=True)

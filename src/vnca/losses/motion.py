@@ -7,7 +7,7 @@ from typing import NamedTuple
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
 
 _SMALLEST_SQUARE = 1e-12
 

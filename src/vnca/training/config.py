@@ -1,107 +1,109 @@
-"""Every hyperparameter of training on smoke, with its presets."""
+"""What training takes whatever it trains on: the hyperparameters of its course."""
 
-import dataclasses
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from math import inf
-from typing import Literal
+from typing import Annotated, Literal
 
-from vnca.automaton.rule import RuleConfig
-from vnca.errors import OptionError
+import tyro
+
+from vnca.core.errors import OptionError
 from vnca.losses.appearance import AppearanceConfig
-from vnca.losses.motion import MotionConfig
-from vnca.training.course import CourseConfig, Pictures, PoolConfig
+from vnca.rule.rule import RuleConfig
 
 
 @dataclass(frozen=True)
-class ViewConfig:
-    """How the smoke is looked at while training."""
+class PoolConfig:
+    """The states that rollouts start from."""
 
-    size: int = 128
-    """Rows and columns of a view, pixels."""
-    azimuths: tuple[float, ...] = ()
-    """Views come from these degrees around the smoke; from all around unless given."""
-    elevation: float = 30.0
-    """Views come from up to this many degrees above or below the horizon."""
-    step: float = 1.0
-    """Distance between samples along a ray, cells."""
-    mode: Literal["sane", "paper"] = "sane"
-    """Integrand: emission and absorption, or the paper's as printed."""
-    cell_opacity: float = 0.95
-    """Without a given gamma, one is chosen that makes a typical cell this opaque: high shows the
-    texture of the surface, low mixes many cells along a ray. For the paper's integrand it is chosen
-    so that typical smoke is as bright as its colour."""
-    gamma: float | None = None
-    """Extinction of density 1, per cell; chosen from the frame unless given."""
+    size: int = 64
+    """States kept."""
+    reseed_every: int = 8
+    """Every so many iterations a state is started again from zero."""
+    limit: float = 4.0
+    """A state with a value beyond this has exploded and is thrown away."""
 
     def __post_init__(self) -> None:
-        if self.size < 32:
-            raise OptionError(f"--view.size {self.size}: at least 32 pixels are needed")
-        if not all(-360 <= azimuth <= 360 for azimuth in self.azimuths):
-            raise OptionError(
-                f"--view.azimuths {' '.join(map(str, self.azimuths))}: must be -360 to 360 degrees"
-            )
-        if not 0 <= self.elevation <= 90:
-            raise OptionError(f"--view.elevation {self.elevation}: must be 0 to 90 degrees")
-        if not 0 < self.step < inf:
-            raise OptionError(f"--view.step {self.step}: must be positive")
-        if not 0 < self.cell_opacity < 1:
-            raise OptionError(f"--view.cell-opacity {self.cell_opacity}: must be between 0 and 1")
-        if self.gamma is not None and not 0 < self.gamma < inf:
-            raise OptionError(f"--view.gamma {self.gamma}: must be positive")
+        if self.size < 1 or self.reseed_every < 1 or not self.limit > 0:
+            raise OptionError("--pool.size, --pool.reseed-every and --pool.limit must be positive")
 
 
 @dataclass(frozen=True)
-class TrainConfig(CourseConfig):
-    """How a rule is trained on smoke."""
+class Pictures:
+    """The pictures that are compared with the style in an iteration.
 
-    motion: MotionConfig = field(default_factory=MotionConfig)
-    view: ViewConfig = field(default_factory=ViewConfig)
-    winds: bool = False
-    """Tell each state of the pool another speed and density of the smoke, and for every other turn
-    the velocity and carry all of the smoke along: the rule learns from one frame to paint smoke
-    that moves otherwise."""
+    Attributes:
+        option: What sets their size.
+        size: Rows and columns, pixels.
+        count: How many there are.
+    """
+
+    option: str
+    size: int
+    count: int
+
+
+@dataclass(frozen=True)
+class CourseConfig(ABC):
+    """How a rule is trained, on whatever it is trained."""
+
+    rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = field(default_factory=RuleConfig)
+    appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
+    pool: PoolConfig = field(default_factory=PoolConfig)
+    iterations: int = 400
+    """Iterations of training."""
+    learning_rate: float = 3e-3
+    """Adam's learning rate at its highest."""
+    rate_warmup: int = 15
+    """Iterations over which the learning rate rises to it: a rule that changes states too much at
+    once makes them explode."""
+    milestones: tuple[float, ...] = (0.6, 0.85)
+    """Parts of the iterations after which the learning rate falls."""
+    decay: float = 0.4
+    """What the learning rate is multiplied by at a milestone."""
+    shortest_rollout: int = 8
+    """Fewest steps of the automaton in an iteration."""
+    longest_rollout: int = 24
+    """Most steps of the automaton in an iteration."""
+    overflow: float = 100.0
+    """Weight of the penalty on states beyond ±1."""
+    features: str = "efficientnet"
+    """Network that compares pictures: efficientnet, edges, imagenet, vgg16 (imagenet where it was
+    fetched before, else edges), or the path of a VGG's weights."""
+    backend: Literal["auto", "native", "triton", "reference"] = "auto"
+    """What computes the automaton."""
+    seed: int = 0
+    """Same seed, same machine, same result."""
+
+    def __post_init__(self) -> None:
+        if self.iterations < 1:
+            raise OptionError(f"--iterations {self.iterations}: at least 1 is needed")
+        if not (0 < self.learning_rate < inf and 0 < self.decay < inf):
+            raise OptionError("--learning-rate and --decay must be positive")
+        if self.rate_warmup < 0:
+            raise OptionError(f"--rate-warmup {self.rate_warmup}: must not be negative")
+        if not all(0 <= part <= 1 for part in self.milestones):
+            raise OptionError(
+                f"--milestones {' '.join(map(str, self.milestones))}: expected parts of the "
+                "iterations, from 0 to 1"
+            )
+        if not 1 <= self.shortest_rollout <= self.longest_rollout:
+            raise OptionError(
+                f"--shortest-rollout {self.shortest_rollout}: must be from 1 to "
+                f"--longest-rollout ({self.longest_rollout})"
+            )
+        if not 0 <= self.overflow < inf:
+            raise OptionError(f"--overflow {self.overflow}: must not be negative")
+        if not 0 <= self.seed < 2**63:
+            raise OptionError(f"--seed {self.seed}: must be from 0 to 2^63 - 1")
 
     @property
+    @abstractmethod
     def pictures(self) -> Pictures:
-        """A view in each iteration."""
-        return Pictures("view.size", self.view.size, 1)
+        """What is looked at in an iteration."""
 
-
-# A cell that knows where it is paints one frame well; one that does not paints any. Strong
-# gradients let patterns hold their shape.
-_ANYWHERE = RuleConfig(sobel_divisor=8, position_prior=False)
-
-# About a pixel a cell: of finer detail comes grain.
-_DRAFT = TrainConfig(
-    iterations=250,
-    learning_rate=1e-3,
-    view=ViewConfig(size=96),
-    pool=PoolConfig(size=16),
-    rule=_ANYWHERE,
-    appearance=AppearanceConfig(grey=False, samples=512),
-    motion=MotionConfig(weight=0.3),
-)
-
-PRESETS = {
-    "draft": _DRAFT,
-    "standard": dataclasses.replace(
-        _DRAFT,
-        iterations=1000,
-        learning_rate=1.5e-3,
-        rule=dataclasses.replace(_ANYWHERE, hidden=128),
-        winds=True,
-    ),
-    "paper": TrainConfig(
-        iterations=5000,
-        learning_rate=1e-3,
-        shortest_rollout=32,
-        longest_rollout=96,
-        view=ViewConfig(size=256, elevation=0.0, mode="paper"),
-        pool=PoolConfig(size=256),
-        rule=RuleConfig(hidden=128),
-        appearance=AppearanceConfig(pixels=0.0, style_scale=1.0),
-        features="vgg16",
-    ),
-}
-"""Training on smoke by name, for rules that begin with a texture: `draft` in minutes on two cores,
-`standard` overnight or on a GPU; and `paper`, as the paper describes it, from nothing."""
+    def rate(self, iteration: int) -> float:
+        """Learning rate of an iteration, counted from 0: a ramp, then a step at each milestone."""
+        ramp = min(1.0, (iteration + 1) / (self.rate_warmup + 1))
+        passed = sum(iteration >= round(part * self.iterations) for part in self.milestones)
+        return self.learning_rate * ramp * self.decay**passed

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from vnca.errors import OutputError
+from vnca.core.errors import OutputError
 
 PATTERN = "events.out.tfevents.*"
 """What TensorBoard calls a file of curves."""

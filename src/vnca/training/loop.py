@@ -13,16 +13,17 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from vnca.automaton.rule import DENSITY_CHANGE, Rule
-from vnca.errors import DivergenceError
+from vnca.core.errors import DivergenceError
+from vnca.core.typing import FloatArray
+from vnca.engine.backend import torch_step
+from vnca.engine.mask import changing_rows
+from vnca.engine.reference.step import Weights
+from vnca.engine.stencil import stencil
 from vnca.features.network import FeatureNetwork
-from vnca.kernels.update.backend import torch_step
-from vnca.kernels.update.mask import changing_rows
-from vnca.kernels.update.reference import Weights
-from vnca.kernels.update.stencil import stencil
 from vnca.losses.appearance import AppearanceLoss
 from vnca.losses.overflow import overflow
-from vnca.training.course import CourseConfig
+from vnca.rule.rule import DENSITY_CHANGE, Rule
+from vnca.training.config import CourseConfig
 from vnca.training.descent import MOST_RETREATS, Descent
 from vnca.training.memory import states_to_keep
 from vnca.training.motion import MotionSupervision
@@ -30,7 +31,6 @@ from vnca.training.pool import Pool
 from vnca.training.rollout import roll_out
 from vnca.training.scene import Scene
 from vnca.training.snapshot import Snapshot, count
-from vnca.typing import FloatArray
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Trainer:
     Attributes:
         config: The hyperparameters.
         scene: What is trained on.
-        step: What computes the automaton, called as `vnca.kernels.update.reference.update` is;
+        step: What computes the automaton, called as `vnca.engine.reference.step.update` is;
             another that does the same may take its place.
         iteration: Iterations done.
         kept_states: How many states of a rollout are kept at a time, at most.

@@ -9,8 +9,8 @@ from typing import Any
 
 import torch
 
-from vnca.errors import OptionError
-from vnca.training.course import CourseConfig
+from vnca.core.errors import OptionError
+from vnca.training.config import CourseConfig
 from vnca.training.rollout import fewest_kept
 from vnca.training.scene import Scene
 

@@ -16,7 +16,7 @@ from torch import Tensor
 from vnca.features.flow import FlowNetwork
 from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss, supervised
 from vnca.losses.pixels import luminance
-from vnca.training.smoke_scene import SmokeScene, SmokeSight
+from vnca.training.scenes.smoke import SmokeScene, SmokeSight
 from vnca.training.snapshot import Snapshot
 
 

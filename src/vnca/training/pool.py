@@ -6,7 +6,7 @@ Reference: Mordvintsev et al. 2020, "Growing Neural Cellular Automata", experime
 import numpy as np
 from torch import Tensor
 
-from vnca.training.course import PoolConfig
+from vnca.training.config import PoolConfig
 from vnca.training.snapshot import Snapshot, count, matched
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import torch
 
-from vnca.io.image import resize
+from vnca.core.typing import FloatArray
+from vnca.io.picture import resize
 from vnca.io.sheet import contact_sheet
 from vnca.training.loop import Trainer
-from vnca.typing import FloatArray
 
 SIZE = 256
 """Rows and columns of each picture, pixels."""

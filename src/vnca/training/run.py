@@ -10,15 +10,15 @@ from typing import Any
 import torch
 
 import vnca
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.errors import OutputError
-from vnca.files import remove_file, remove_leftovers, whole_file, writable_folder
-from vnca.io.image import write_image
+from vnca.core.errors import OutputError
+from vnca.core.files import remove_file, remove_leftovers, whole_file, writable_folder
+from vnca.core.typing import FloatArray
+from vnca.io.picture import write_image
+from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, Thrift
-from vnca.training.course import CourseConfig
+from vnca.training.config import CourseConfig
 from vnca.training.curves import PATTERN, Curves
 from vnca.training.loop import Progress
-from vnca.typing import FloatArray
 
 CONFIG_NAME = "config.json"
 _PREVIEW = "preview_{:06d}.png"

@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from vnca.automaton.domain import Domain
-from vnca.typing import FloatArray
+from vnca.core.typing import FloatArray
+from vnca.engine.domain import Domain
 
 Sight = TypeVar("Sight")
 """Where a scene is looked at from, to look at several states alike."""

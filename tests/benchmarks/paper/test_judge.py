@@ -6,10 +6,10 @@ import torch
 from judge import SIDES, UNPAINTED, Judge, magnified, paint
 from study import Study
 
-from vnca.automaton.rule import Rule, RuleConfig, Scales
-from vnca.colour import srgb_to_linear
-from vnca.render.view import View
-from vnca.volume import Volume
+from vnca.core.colour import srgb_to_linear
+from vnca.core.volume import Volume
+from vnca.rendering.view import View
+from vnca.rule.rule import Rule, RuleConfig, Scales
 
 
 @pytest.fixture(scope="module")

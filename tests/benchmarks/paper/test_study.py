@@ -6,10 +6,10 @@ import pytest
 import study
 from study import REFERENCE, Findings, Study, table
 
-from vnca.automaton.model import MODEL_NAME, Model
-from vnca.automaton.rule import Rule, Scales
 from vnca.cli.train import Train
-from vnca.errors import FileFormatError, OptionError
+from vnca.core.errors import FileFormatError, OptionError
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule, Scales
 from vnca.training.checkpoint import CHECKPOINT_NAME
 
 Make = Callable[..., Study]

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vnca.core.typing import Box
 from vnca.io.vdb import VALUE_TYPES, Grid, Metadata, Tiles, Transform
-from vnca.typing import Box
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[2]

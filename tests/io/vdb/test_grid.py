@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
+from vnca.core.typing import Box
 from vnca.io.vdb import Grid, Transform
-from vnca.typing import Box
 
 UNIT = Transform.uniform(1.0)
 corners = st.tuples(*[st.integers(-40, 40)] * 3)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.errors import FileFormatError, GridError, OptionError
+from vnca.core.errors import FileFormatError, GridError, OptionError
 from vnca.io.vdb import Entry, Grid, Metadata, Transform, open_vdb, write_vdb
 
 Builder = Callable[..., Grid]

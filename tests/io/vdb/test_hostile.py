@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from vnca.errors import FileFormatError, GridError
+from vnca.core.errors import FileFormatError, GridError
+from vnca.core.typing import Box
 from vnca.io.vdb import Grid, open_vdb, write_vdb
-from vnca.typing import Box
 
 Builder = Callable[..., Grid]
 

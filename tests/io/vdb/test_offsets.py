@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.errors import FileFormatError, GridError
+from vnca.core.errors import FileFormatError, GridError
 from vnca.io.vdb import VALUE_TYPES, Grid, open_vdb, write_vdb
 from vnca.io.vdb.cursor import Cursor
 from vnca.io.vdb.metadata import read_metadata

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
 from vnca.io.provenance import Provenance
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write, write_vdb

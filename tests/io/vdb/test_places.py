@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vnca.core.lattice import Lattice
+from vnca.core.typing import AnyArray
+from vnca.core.volume import Volume
 from vnca.io.orientation import on_lattice
 from vnca.io.smoke import SmokeFormat, read_smoke, write_painted
-from vnca.lattice import Lattice
-from vnca.typing import AnyArray
-from vnca.volume import Volume
 
 Judge = Callable[[list[Path]], list[list[dict[str, Any]]]]
 FORM = SmokeFormat(velocity_units="m/s", fps=4)

@@ -10,7 +10,7 @@ import blosc
 import numpy as np
 import pytest
 
-from vnca.errors import GridError, OptionError
+from vnca.core.errors import GridError, OptionError
 from vnca.io.vdb import Grid, Metadata, Tiles, Transform, open_vdb, write_vdb
 
 Builder = Callable[..., Grid]

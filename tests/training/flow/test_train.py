@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Generator, Tensor
 
-from vnca.errors import BackendUnavailableError, OutputError
+from vnca.core.errors import BackendUnavailableError, OutputError
 from vnca.features.flow import FlowNetwork
 from vnca.training.flow import train as loop
 from vnca.training.flow.pairs import Pairs, random_pairs

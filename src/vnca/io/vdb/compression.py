@@ -14,10 +14,10 @@ import blosc
 import blosc.blosc_extension
 import numpy as np
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
+from vnca.core.typing import AnyArray, BoolArray
 from vnca.io.vdb.cursor import Cursor
 from vnca.io.vdb.layout import Compression, NodeCode, ValueType, bits_of
-from vnca.typing import AnyArray, BoolArray
 
 _BLOSC_HEADER = struct.Struct("<4B3I")  # versions, flags, type size; bytes, block, packed bytes
 _BLOSC_LEVEL, _ONE_BLOCK = 9, 32 * 1024

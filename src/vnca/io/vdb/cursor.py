@@ -4,7 +4,7 @@ import struct
 from functools import cache
 from typing import Any, BinaryIO
 
-from vnca.errors import FileFormatError
+from vnca.core.errors import FileFormatError
 
 
 class Cursor:

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
+from vnca.core.typing import AnyArray, BoolArray
 from vnca.io.vdb.compression import Codec
 from vnca.io.vdb.grid import Grid
 from vnca.io.vdb.layout import (
@@ -27,7 +28,6 @@ from vnca.io.vdb.layout import (
 )
 from vnca.io.vdb.metadata import Entry, Metadata
 from vnca.io.vdb.tree import BOOL_LEAF
-from vnca.typing import AnyArray, BoolArray
 
 _INT_MAX, _INT_MIN = 2**31 - 1, -(2**31)
 

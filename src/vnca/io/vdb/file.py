@@ -9,8 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import BinaryIO
 
-from vnca.errors import FileFormatError, GridError
-from vnca.files import existing_file
+from vnca.core.errors import FileFormatError, GridError
+from vnca.core.files import existing_file
 from vnca.io.vdb.cursor import Cursor
 from vnca.io.vdb.grid import Grid
 from vnca.io.vdb.header import GridHeader, Source, decoded, read_header

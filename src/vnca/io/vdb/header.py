@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
+from vnca.core.typing import Box
 from vnca.io.vdb.cursor import Cursor
 from vnca.io.vdb.grid import EMPTY_BOX, Grid
 from vnca.io.vdb.layout import (
@@ -22,7 +23,6 @@ from vnca.io.vdb.layout import (
 from vnca.io.vdb.metadata import Metadata, read_metadata
 from vnca.io.vdb.transform import Transform, read_transform
 from vnca.io.vdb.tree import locate_leaves, read_tree
-from vnca.typing import Box
 
 _TREE_NAME = "Tree_{}_" + "_".join(map(str, TREE))
 

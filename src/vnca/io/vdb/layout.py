@@ -8,7 +8,7 @@ from enum import IntEnum, IntFlag
 
 import numpy as np
 
-from vnca.typing import AnyArray, IntArray
+from vnca.core.typing import AnyArray, IntArray
 
 MAGIC = 0x56444220
 OLDEST_VERSION, NEWEST_VERSION = 222, 225

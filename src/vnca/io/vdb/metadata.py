@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vnca.errors import OptionError
+from vnca.core.errors import OptionError
 from vnca.io.vdb.cursor import Cursor, encode_string
 
 _LAYOUTS = {

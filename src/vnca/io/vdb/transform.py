@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vnca.errors import GridError
+from vnca.core.errors import GridError
+from vnca.core.typing import AnyArray
 from vnca.io.vdb.cursor import Cursor, encode_string
-from vnca.typing import AnyArray
 
 # Doubles each linear map stores.
 _DOUBLES = {

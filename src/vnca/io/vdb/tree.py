@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vnca.core.typing import AnyArray, BoolArray, IntArray
 from vnca.io.vdb.compression import Codec, read_value
 from vnca.io.vdb.cursor import Cursor
 from vnca.io.vdb.layout import (
@@ -22,7 +23,6 @@ from vnca.io.vdb.layout import (
     bits_of,
     slot_origins,
 )
-from vnca.typing import AnyArray, BoolArray, IntArray
 
 
 class Tiles(NamedTuple):

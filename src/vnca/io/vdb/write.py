@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-from vnca.errors import GridError, OptionError
-from vnca.files import whole_file
+from vnca.core.errors import GridError, OptionError
+from vnca.core.files import whole_file
 from vnca.io.vdb.cursor import encode_string
 from vnca.io.vdb.encode import encode_grid
 from vnca.io.vdb.grid import Grid

@@ -4,7 +4,7 @@ import sys
 
 import tyro
 
-from vnca.errors import VncaError
+from vnca.core.errors import VncaError
 from vnca.training.flow.train import FlowTraining, train
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from torch import Generator, Tensor
 from torch.nn import functional
 
-from vnca.errors import BackendUnavailableError
+from vnca.core.errors import BackendUnavailableError
 
 Kind = Callable[[int, int, Generator], Tensor]
 

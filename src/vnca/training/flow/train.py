@@ -10,9 +10,9 @@ import torch
 from jaxtyping import Float
 from torch import Generator, Tensor
 
-from vnca.errors import BackendUnavailableError
+from vnca.core.errors import BackendUnavailableError
+from vnca.core.files import writable_file
 from vnca.features.flow import FlowNetwork
-from vnca.files import writable_file
 from vnca.training.flow.pairs import Pairs, random_pairs
 from vnca.training.flow.textures import KINDS, bank
 

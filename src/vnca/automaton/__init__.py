@@ -1,1 +1,0 @@
-"""The trained rule: hyperparameters, weights, priors and its model file."""

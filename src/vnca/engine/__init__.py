@@ -1,0 +1,1 @@
+"""Steps of the automaton: active cells, mask, stencil, and one folder a backend."""

@@ -1,0 +1,171 @@
+"""Where cells live: within reach of the smoke or in all of its box, in index space."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Literal
+
+import numpy as np
+
+from vnca.core.bricks.field import Field
+from vnca.core.bricks.growth import dilated
+from vnca.core.bricks.places import EDGE, cells_at, runs_of_bricks
+from vnca.core.errors import OptionError
+from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray, Index, IntArray
+from vnca.engine.mask import HashArray, hash_cells
+from vnca.engine.stencil import OFFSETS
+
+MOST_CELLS = 2**27
+"""A larger box (512³) may not live as a whole."""
+
+Border = Literal["replicate", "circular"]
+DomainKind = Literal["active", "box"]
+"""Cells within reach of the smoke, or all cells of its box."""
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """Cells that are alive, as a list; the states of an automaton are kept in its order.
+
+    A state over a domain is `[n + 1, C]`: a row a cell, and a last row of zeros that stands for
+    everything that does not live. Cost and memory follow the smoke, not its box.
+
+    Attributes:
+        cells: `[n, 3]` index coordinates, all inside `box`, each once; brick by brick, so that
+            neighbours in space are neighbours in memory.
+        box: Beyond its border neighbours are repeated or wrapped, even where nothing lives.
+        border: What a cell at the border of the box sees beyond it.
+    """
+
+    cells: IntArray
+    box: Box
+    border: Border = "replicate"
+
+    @classmethod
+    def from_mask(
+        cls,
+        alive: BoolArray,
+        origin: Index,
+        *,
+        box: Box | None = None,
+        border: Border = "replicate",
+    ) -> "Domain":
+        """The cells where `alive[x, y, z]` holds; `origin` is the index of `alive[0, 0, 0]`.
+
+        The box is that of the array unless given.
+        """
+        field = Field.from_dense(alive, origin)
+        return cls(cells_at(field.bricks, field.values), box or field.box, border)
+
+    @classmethod
+    def around_smoke(cls, density: Field, *, threshold: float, reach: int, box: Box) -> "Domain":
+        """Cells of `box` at most `reach` cells (along each axis) from density over `threshold`.
+
+        The reach lets a cell live for a while before smoke arrives in it.
+        """
+        smoke = replace(density, values=density.values > threshold, outside=False)
+        smoke = smoke.within(box).trimmed()
+        alive = dilated(replace(smoke, box=smoke.box.grown(reach).intersection(box)), reach)
+        return cls(cells_at(alive.bricks, alive.values), box)
+
+    @classmethod
+    def filling(cls, box: Box) -> "Domain":
+        """All cells of a box.
+
+        Raises:
+            OptionError: If there are too many.
+        """
+        if math.prod(box.shape) > MOST_CELLS:
+            raise OptionError(
+                f"--domain box: the box of the smoke, {box.lower} to {box.upper}, has "
+                f"{math.prod(box.shape)} cells, and at most {MOST_CELLS} can live; "
+                "use --domain active"
+            )
+        return cls.from_mask(np.ones(box.shape, dtype=bool), box.lower)
+
+    def __len__(self) -> int:
+        """Number of cells alive."""
+        return len(self.cells)
+
+    @cached_property
+    def rows(self) -> Field:
+        """The row of each cell in the state, n where nothing lives."""
+        rows = np.arange(len(self), dtype=np.int32)
+        return Field.from_cells(self.cells, rows, self.box, outside=np.int32(len(self)))
+
+    @cached_property
+    def neighbours(self) -> IntArray:
+        """`[27, n]` rows of the state around each cell, n where nothing lives."""
+        result = np.empty((len(OFFSETS), len(self)), np.int32)
+        if len(self) == 0:
+            return result
+        around = self.rows.haloed()
+        strides = np.array([s // around.itemsize for s in around.strides])
+        runs, lengths = runs_of_bricks(self.cells)
+        at = np.repeat(self.rows.places.find(runs) * strides[0], lengths)
+        for axis in range(3):
+            at += ((self.cells[:, axis] & (EDGE - 1)) + 1) * strides[1 + axis]
+        for row, offset in zip(result, OFFSETS, strict=True):
+            np.take(around.reshape(-1), at + offset @ strides[1:], out=row, mode="clip")
+        lower, upper = np.asarray(self.box.lower), np.asarray(self.box.upper)
+        border = np.flatnonzero(((self.cells == lower) | (self.cells == upper - 1)).any(axis=1))
+        cells = self.cells[border]
+        beside = cells + OFFSETS[:, None]
+        if self.border == "replicate":
+            # What is repeated is a neighbour, too.
+            steps = np.clip(beside, lower, upper - 1) - cells
+            result[:, border] = around.reshape(-1)[at[border] + steps @ strides[1:]]
+        else:
+            wrapped = ((beside - lower) % (upper - lower) + lower).reshape(-1, 3)
+            result[:, border] = self.rows.gather(wrapped).reshape(len(OFFSETS), -1)
+        return result
+
+    def corners(self, points: AnyArray) -> tuple[IntArray, FloatArray]:
+        """Between which cells points lie, as decoding wants to know.
+
+        Args:
+            points: `[m, 3]` index coordinates, finite; cell `[i, j, k]` has its centre there.
+
+        Returns:
+            Rows `[8, m]` of the state around each point, z fastest, n where nothing lives; and
+            `[m, 3]` how far it lies from the first of these cells to the last, 0 to 1.
+        """
+        lower, upper = np.asarray(self.box.lower), np.asarray(self.box.upper)
+        first = np.floor(points)
+        fractions = (points - first).astype(np.float32)
+        cells = first + np.array(list(product((0, 1), repeat=3)))[:, None]
+        if self.border == "replicate":
+            cells = cells.clip(lower, upper - 1)
+        else:
+            cells = (cells - lower) % (upper - lower) + lower
+        rows = self.rows.gather(cells.astype(np.int32).reshape(-1, 3))
+        return rows.reshape(8, -1), fractions
+
+    @cached_property
+    def places(self) -> AnyArray:
+        """`[n]` where each cell lies in its box, if that is laid out flat."""
+        at = self.cells - np.asarray(self.box.lower)
+        return np.asarray(np.ravel_multi_index(tuple(at.T), self.box.shape))
+
+    @cached_property
+    def hashes(self) -> HashArray:
+        """`[n]` hash of each cell's index coordinates, for the update mask."""
+        return hash_cells(self.cells)
+
+    def seed(self, channels: int) -> FloatArray:
+        """The state every rollout starts from: zeros `[n + 1, channels]`."""
+        return np.zeros((len(self) + 1, channels), dtype=np.float32)
+
+    def scatter(self, values: AnyArray, box: Box) -> AnyArray:
+        """Dense `[x, y, z, ...]` over `box` of values `[n, ...]`, zero where nothing lives."""
+        at = self.cells - np.asarray(box.lower, dtype=np.int32)
+        reached = ((at >= 0) & (at < box.shape)).all(axis=1)
+        field = np.zeros((*box.shape, *values.shape[1:]), dtype=values.dtype)
+        field[tuple(at[reached].T)] = values[reached]
+        return field
+
+    def carry(self, state: AnyArray, other: "Domain") -> AnyArray:
+        """The state on `other`: cells alive in both keep theirs, new ones start from zero."""
+        rows = self.rows.gather(other.cells)
+        return state[np.append(rows, np.int32(len(self)))]

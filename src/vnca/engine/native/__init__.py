@@ -1,0 +1,1 @@
+"""The backend in C++, fused and vectorised, threaded."""

@@ -1,0 +1,73 @@
+from collections.abc import Sequence
+
+from vnca.core.typing import FloatArray, IntArray
+
+def instructions(bfloat16: bool, /) -> list[str]: ...
+def forward(
+    state: FloatArray,
+    rows: IntArray,
+    neighbours: IntArray,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    out: FloatArray,
+    threads: int,
+    bfloat16: bool,
+    instructions: str,
+    /,
+) -> None: ...
+def backward(
+    state: FloatArray,
+    rows: IntArray,
+    neighbours: IntArray,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    gradient: FloatArray,
+    to_state: FloatArray,
+    to_hidden: FloatArray,
+    to_bias: FloatArray,
+    to_output: FloatArray,
+    threads: int,
+    bfloat16: bool,
+    instructions: str,
+    /,
+) -> None: ...
+def decode_instructions() -> list[str]: ...
+def decode_forward(
+    state: FloatArray,
+    rows: IntArray,
+    fractions: FloatArray,
+    weights: Sequence[FloatArray],
+    out: FloatArray,
+    threads: int,
+    instructions: str,
+    /,
+) -> None: ...
+def decode_subdivided(
+    state: FloatArray,
+    cells: IntArray,
+    neighbours: IntArray,
+    factor: int,
+    weights: Sequence[FloatArray],
+    out: FloatArray,
+    threads: int,
+    instructions: str,
+    /,
+) -> None: ...
+def decode_backward(
+    state: FloatArray,
+    rows: IntArray,
+    fractions: FloatArray,
+    weights: Sequence[FloatArray],
+    gradient: FloatArray,
+    to_state: FloatArray,
+    to_weights: Sequence[FloatArray],
+    threads: int,
+    instructions: str,
+    /,
+) -> None: ...

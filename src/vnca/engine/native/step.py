@@ -1,0 +1,176 @@
+"""One step of the automaton on the CPU, fused and vectorised; numpy in and out, float32.
+
+The work is done by a small C++ extension (folder `cpp`), which installation leaves out where it
+finds no compiler. It picks the widest instructions that the machine has when it is called. Asked
+for, it rounds what the matrix products multiply to bfloat16, for twice their speed; everything
+else, also their sums, stays float32. How large the error is says the README beside this file.
+"""
+
+import os
+from collections.abc import Callable
+from typing import Any, Literal, ParamSpec, TypeVar, get_args
+
+import numpy as np
+
+from vnca.core.errors import BackendUnavailableError, OptionError, ShapeError
+from vnca.core.typing import FloatArray, IntArray
+
+try:
+    import vnca.engine.native._native as _native  # pyright: ignore[reportMissingModuleSource]
+except ImportError as error:
+    _native: Any = None
+    _reason = str(error)
+
+P = ParamSpec("P")
+T = TypeVar("T")
+Precision = Literal["float32", "bfloat16"]
+"""Of the factors of the matrix products."""
+
+
+def unavailable(precision: Precision = "float32") -> str | None:
+    """Why the native kernel cannot run here, or nothing if it can.
+
+    Raises:
+        OptionError: If there is no precision of that name.
+    """
+    if precision not in get_args(Precision):
+        expected = " or ".join(get_args(Precision))
+        raise OptionError(f"precision: expected {expected}, got {precision}")
+    if _native is None:
+        return (
+            f"its extension was not built, or does not load ({_reason}); "
+            "reinstall with GCC or Clang"
+        )
+    if not _native.instructions(precision == "bfloat16"):
+        return (
+            "bfloat16 takes a processor with AVX512_BF16, and a compiler that knows it; "
+            "use precision float32"
+        )
+    return None
+
+
+def instructions(precision: Precision = "float32") -> list[str]:
+    """Instruction sets that the kernel can use on this machine, the default first.
+
+    Raises:
+        BackendUnavailableError: If there is none, or the extension was not built.
+        OptionError: If there is no precision of that name.
+    """
+    return extension(precision).instructions(precision == "bfloat16")
+
+
+def default_threads() -> int:
+    """Cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def forward(
+    state: FloatArray,
+    rows: IntArray,
+    neighbours: IntArray,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    *,
+    threads: int | None = None,
+    out: FloatArray | None = None,
+    precision: Precision = "float32",
+    instructions: str = "",
+) -> FloatArray:
+    """The state after one step: s' = s + W2 relu(W1 [z ‖ priors] + b1) on `rows`, s elsewhere.
+
+    Bit-equal between runs and whatever the number of threads. Other Python threads run meanwhile.
+
+    Args:
+        state: `[n + 1, C]`, C at most 64; the last row is the outside, always zero.
+        rows: `[m]` cells that change in this step, ascending.
+        neighbours: `[27, n]` rows of the state around each cell; n where nothing lives.
+        priors: `[n, P]`, P at most 16.
+        hidden: W1 `[H, 5C + P]`, H at most 512.
+        bias: b1 `[H]`.
+        output: W2 `[C, H]`.
+        stencil: `[5, 27]` from `vnca.engine.stencil`, with any divisors.
+        threads: How many to use; by default one for each core.
+        out: `[n + 1, C]` to write to; by default a new array.
+        precision: What the factors of W1 [z ‖ priors] and W2 relu(…) are rounded to.
+        instructions: One of `instructions(precision)`; by default the first.
+
+    Returns:
+        `[n + 1, C]`.
+
+    Raises:
+        BackendUnavailableError: If the extension was not built, or this machine has no bfloat16.
+        OptionError: If there is no precision of that name.
+        ShapeError: If arrays are not contiguous, of other shapes or types than above, or hold
+            indices out of range.
+    """
+    if out is None:
+        out = np.empty_like(state)
+    arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, out)
+    options = (threads or default_threads(), precision == "bfloat16", instructions)
+    checked("update step", extension(precision).forward, *arguments, *options)
+    return out
+
+
+def backward(
+    state: FloatArray,
+    rows: IntArray,
+    neighbours: IntArray,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    gradient: FloatArray,
+    *,
+    threads: int | None = None,
+    precision: Precision = "float32",
+    instructions: str = "",
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Gradients of the state `[n + 1, C]`, W1, b1 and W2 from the gradient of `forward`'s result.
+
+    The hidden layer is computed anew. With `precision` bfloat16 the factors of all products are
+    rounded, and gradients are those of the step as it is then computed. Bit-equal between runs and
+    whatever the number of threads. The gradient of the outside is zero. Arguments and errors are
+    those of `forward`.
+    """
+    results = tuple(np.empty_like(array) for array in (state, hidden, bias, output))
+    arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, gradient)
+    options = (threads or default_threads(), precision == "bfloat16", instructions)
+    checked("update step", extension(precision).backward, *arguments, *results, *options)
+    to_state, to_hidden, to_bias, to_output = results
+    return to_state, to_hidden, to_bias, to_output
+
+
+def extension(precision: Precision = "float32") -> Any:
+    """The module of the native kernels.
+
+    Raises:
+        BackendUnavailableError: If it was not built, or this machine has no such precision.
+        OptionError: If there is no precision of that name.
+    """
+    reason = unavailable(precision)
+    if reason is not None:
+        raise BackendUnavailableError(f"the native kernel cannot run: {reason}")
+    return _native
+
+
+def checked(operation: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """The result of a native function.
+
+    Raises:
+        ShapeError: Naming the operation and the array, if it refuses one.
+    """
+    try:
+        return function(*args, **kwargs)
+    except ValueError as error:
+        raise ShapeError(f"{operation}: {error}") from None
+    except TypeError:
+        raise ShapeError(
+            f"{operation}: expected arrays of float32 or int32 in this machine's byte order, those "
+            "to be written to writable, and at most 2³¹ threads"
+        ) from None

@@ -1,0 +1,68 @@
+"""The native step in torch's automatic differentiation; float32 on the CPU."""
+
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from vnca.core.typing import AnyArray
+from vnca.engine.native import step as native
+from vnca.engine.reference.step import Weights
+
+
+def update(
+    state: Tensor,
+    rows: Tensor,
+    neighbours: Tensor,
+    priors: Tensor,
+    weights: Weights,
+    stencil: Tensor,
+    *,
+    threads: int | None = None,
+    precision: native.Precision = "float32",
+) -> Tensor:
+    """The state after one step, as `vnca.engine.reference.step.update` has it.
+
+    Differentiable, once, in the state and the weights. Beyond the two states, memory is kept for
+    nothing: the backward pass computes the hidden layer anew.
+
+    Args:
+        state: `[n + 1, C]`; the last row is the outside, always zero.
+        rows: `[m]` cells that change in this step, int32, ascending.
+        neighbours: `[27, n]` rows of the state around each cell, int32; n where nothing lives.
+        priors: `[n, P]`.
+        weights: W1, b1 and W2.
+        stencil: `[5, 27]` perception filters.
+        threads: How many to use; by default one for each core.
+        precision: What the factors of the products are rounded to, forward and backward.
+
+    Raises:
+        BackendUnavailableError: If the native kernel was not built, or has no such precision here.
+        ShapeError: If shapes, types or indices are not as above.
+    """
+    result = _Update.apply(state, rows, neighbours, priors, *weights, stencil, threads, precision)
+    assert isinstance(result, Tensor)
+    return result
+
+
+class _Update(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, *inputs: Any) -> Tensor:
+        *tensors, threads, precision = inputs
+        ctx.options = {"threads": threads, "precision": precision}
+        ctx.save_for_backward(*tensors)
+        return torch.from_numpy(native.forward(*map(_array, tensors), **ctx.options))
+
+    @staticmethod
+    @once_differentiable
+    def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
+        ctx: Any, *grad_outputs: Tensor
+    ) -> tuple[Tensor | None, ...]:
+        arrays = map(_array, (*ctx.saved_tensors, *grad_outputs))
+        to_state, *to_weights = map(torch.from_numpy, native.backward(*arrays, **ctx.options))
+        return to_state, None, None, None, *to_weights, None, None, None
+
+
+def _array(tensor: Tensor) -> AnyArray:
+    return tensor.detach().contiguous().numpy()

@@ -1,0 +1,1 @@
+"""The reference in torch: written to be read, never called by a fast path."""

@@ -1,0 +1,280 @@
+"""The step on NVIDIA GPUs in torch's automatic differentiation, computed by Triton kernels."""
+
+from collections.abc import Callable
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+from torch.utils.weak import WeakTensorKeyDictionary
+
+from vnca.core.errors import ShapeError
+from vnca.engine.reference.step import Weights
+from vnca.engine.stencil import FILTERS, NEIGHBOURS
+from vnca.engine.stencil import stencil as filters
+from vnca.engine.triton.perceivers import Perceivers
+
+try:
+    import triton
+    from triton import knobs
+
+    from vnca.engine.triton import step_backward as triton_backward
+    from vnca.engine.triton import step_forward as triton_forward
+except ImportError as error:
+    triton: Any = None
+    triton_forward: Any = None
+    triton_backward: Any = None
+    _missing = str(error)
+    _interpreted = False
+else:
+    _missing = None
+    _interpreted = knobs.runtime.interpret  # TRITON_INTERPRET; setting it later has no effect
+
+T = TypeVar("T")
+Precision = Literal["ieee", "tf32x3", "tf32"]
+"""Products of float32: exact, as three products on tensor cores (nearly so), as one (10 bits)."""
+
+PROGRAMS = 4
+"""Programs for each multiprocessor; they take tiles of changing cells in turns."""
+TILE = 64
+"""Cells that a program works on at a time, if their channels are 16 or fewer."""
+WARPS = 4, 8, 4
+"""Of 32 threads, in a program of the forward pass, the weights' gradient and the state's."""
+WEIGHT_BYTES = 1 << 16, 1 << 15
+"""What the weights of the hidden units that a program works on at a time may take in a
+multiprocessor's shared memory, in the forward and the backward pass; at most 128 of them."""
+TYPES = (torch.float32, torch.float16, torch.bfloat16)
+OPTIONS: dict[str, Any] = {"num_stages": 1, "enable_fp_fusion": True}
+MOST_CHANNELS, MOST_PRIORS = 64, 31
+"""What fits into a multiprocessor."""
+LARGEST = 2**31 - 1
+"""Offsets into arrays are 32-bit numbers."""
+
+
+def unavailable(device: str) -> str | None:
+    """Why the Triton kernels cannot run on a kind of device, or nothing if they can."""
+    if _missing is not None:
+        return f"the package triton is not installed, or does not load ({_missing})"
+    if _interpreted:
+        return None
+    if device != "cuda":
+        return f"the Triton kernels work on NVIDIA GPUs, not on {device}"
+    if not torch.cuda.is_available():
+        return "torch finds no NVIDIA GPU"
+    return None
+
+
+def update(
+    state: Tensor,
+    rows: Tensor,
+    neighbours: Tensor,
+    priors: Tensor,
+    weights: Weights,
+    stencil: Tensor,
+    *,
+    precision: Precision | None = None,
+) -> Tensor:
+    """The state after one step, as `vnca.engine.reference.step.update` has it.
+
+    Differentiable, once, in the state and the weights. Beyond the two states, memory is kept for
+    nothing: the backward pass computes the hidden layer anew. The same bits in every run on one
+    kind of GPU.
+
+    Args:
+        state: `[n + 1, C]`, float32, float16 or bfloat16; the last row is the outside, always
+            zero. Products are of numbers of this type, sums are float32.
+        rows: `[m]` cells that change in this step, int32, ascending; not checked.
+        neighbours: `[27, n]` rows of the state around each cell, int32; n where nothing lives; not
+            checked. What is derived from the table is kept with it: do not change it in place.
+        priors: `[n, P]`.
+        weights: W1, b1 and W2.
+        stencil: `[5, 27]` from `vnca.engine.stencil`, with any divisors.
+        precision: Of float32 products; by default `tf32x3`, or `tf32` if torch is told that this
+            is enough (`torch.set_float32_matmul_precision`).
+
+    Raises:
+        ShapeError: If shapes or types are not as above, or too large.
+    """
+    _check(state, rows, neighbours, priors, weights)
+    if precision is None:
+        exact = torch.get_float32_matmul_precision() == "highest"
+        precision = "tf32x3" if exact else "tf32"
+    trained = torch.is_grad_enabled() and any(t.requires_grad for t in (state, *weights))
+    perceivers = _known(_perceivers, Perceivers.of, neighbours) if trained else None
+    scales = _known(_scales, _read_scales, stencil)
+    tensors = (state, rows, neighbours, priors, *weights)
+    result = _Update.apply(*tensors, perceivers, scales, precision)
+    assert isinstance(result, Tensor)
+    return result
+
+
+class _Update(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, *inputs: Any) -> Tensor:
+        *tensors, ctx.perceivers, ctx.scales, ctx.precision = inputs
+        tensors = [tensor.contiguous() for tensor in tensors]
+        ctx.save_for_backward(*tensors)
+        state, rows, neighbours = tensors[:3]
+        if len(rows) == 0:
+            return state.clone()
+        out = torch.empty_like(state)
+        sizes = _sizes(state, tensors[3], tensors[4], WEIGHT_BYTES[0])
+        with torch.cuda.device_of(state):
+            triton_forward.forward_kernel[(_programs(rows, sizes),)](
+                *tensors,
+                out,
+                neighbours.shape[1],
+                len(rows),
+                ctx.scales,
+                **sizes,
+                PRECISION=ctx.precision,
+                num_warps=WARPS[0],
+                **OPTIONS,
+            )
+        return out
+
+    @staticmethod
+    @once_differentiable
+    def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
+        ctx: Any, *grad_outputs: Tensor
+    ) -> tuple[Tensor | None, ...]:
+        gradient = grad_outputs[0].contiguous()
+        tensors = ctx.saved_tensors
+        state, rows, neighbours, priors, *weights = tensors
+        hidden = weights[0]
+        n, channels, units = neighbours.shape[1], state.shape[1], len(hidden)
+        sizes = _sizes(state, priors, hidden, WEIGHT_BYTES[1])
+        programs = _programs(rows, sizes)
+        # Unsummed gradients of W1ᵀ, b1 and W2, one below the other.
+        partials = state.new_empty(
+            (programs, hidden.shape[1] + 1 + channels, units), dtype=torch.float32
+        )
+        to_perceived = state.new_empty(len(rows), FILTERS * channels)
+        place = torch.full((n,), -1, dtype=torch.int32, device=state.device)
+        to_state = torch.empty_like(state)
+        with torch.cuda.device_of(state):
+            if programs:
+                triton_backward.weights_kernel[(programs,)](
+                    *tensors,
+                    gradient,
+                    to_perceived,
+                    place,
+                    partials,
+                    n,
+                    len(rows),
+                    ctx.scales,
+                    **sizes,
+                    PRECISION=ctx.precision,
+                    num_warps=WARPS[1],
+                    **OPTIONS,
+                )
+            tile = sizes["TILE"]
+            triton_backward.state_kernel[(triton.cdiv(n + 1, tile),)](
+                gradient,
+                to_perceived,
+                place,
+                neighbours,
+                *ctx.perceivers,
+                to_state,
+                n,
+                len(ctx.perceivers.source),
+                channels,
+                sizes["WIDTH"],
+                tile,
+                num_warps=WARPS[2],
+                **OPTIONS,
+            )
+        total = partials.sum(0)
+        split = total.split([hidden.shape[1], 1, channels])
+        to_weights = (split[0].t(), split[1][0], split[2])
+        to_weights = (g.to(w.dtype) for g, w in zip(to_weights, weights, strict=True))
+        return to_state, None, None, None, *to_weights, None, None, None
+
+
+def _sizes(state: Tensor, priors: Tensor, hidden: Tensor, weight_bytes: int) -> dict[str, int]:
+    """What the kernels are compiled for."""
+    width = max(16, triton.next_power_of_2(state.shape[1]))
+    prior_width = max(16, triton.next_power_of_2(priors.shape[1] + 1))
+    units = weight_bytes // ((FILTERS + 1) * width + prior_width) // state.element_size()
+    units = min(128, 1 << (units.bit_length() - 1), triton.next_power_of_2(len(hidden)))
+    return {
+        "C": state.shape[1],
+        "P": priors.shape[1],
+        "H": len(hidden),
+        "WIDTH": width,
+        "PRIOR_WIDTH": prior_width,
+        "UNITS": max(16, units),
+        "TILE": max(16, 16 * TILE // width),
+    }
+
+
+def _programs(rows: Tensor, sizes: dict[str, int]) -> int:
+    processors = 1
+    if rows.device.type == "cuda":
+        processors = torch.cuda.get_device_properties(rows.device).multi_processor_count
+    return min(triton.cdiv(len(rows), sizes["TILE"]), PROGRAMS * processors)
+
+
+def _check(
+    state: Tensor, rows: Tensor, neighbours: Tensor, priors: Tensor, weights: Weights
+) -> None:
+    """Everything but the values of indices, which the CPU does not know."""
+    n = neighbours.shape[1] if neighbours.ndim == 2 else 0
+    c, p = (t.shape[1] if t.ndim == 2 else 0 for t in (state, priors))
+    h = len(weights.hidden)
+    shapes = {
+        "state": (state, (n + 1, c)),
+        "rows": (rows, (rows.numel(),)),
+        "neighbours": (neighbours, (NEIGHBOURS, n)),
+        "priors": (priors, (n, p)),
+        "hidden weights": (weights.hidden, (h, FILTERS * c + p)),
+        "hidden bias": (weights.bias, (h,)),
+        "output weights": (weights.output, (c, h)),
+    }
+    for name, (tensor, shape) in shapes.items():
+        indices = name in ("rows", "neighbours")
+        if tuple(tensor.shape) != shape:
+            problem = f"expected shape {shape}, got {tuple(tensor.shape)}"
+        elif tensor.dtype not in ((torch.int32,) if indices else TYPES):
+            problem = f"expected {'int32' if indices else 'float32 or shorter'}, got {tensor.dtype}"
+        elif tensor.device != state.device:
+            problem = f"expected on {state.device} like the state, got {tensor.device}"
+        else:
+            continue
+        raise ShapeError(f"update step: {name}: {problem}")
+    if not (1 <= c <= MOST_CHANNELS and p <= MOST_PRIORS and h >= 1):
+        raise ShapeError(
+            f"update step: {c} channels, {p} priors, {h} hidden units: the Triton kernels work "
+            f"with 1 to {MOST_CHANNELS} channels, up to {MOST_PRIORS} priors and at least one unit"
+        )
+    if max(NEIGHBOURS, FILTERS * c, p) * n > LARGEST:
+        raise ShapeError(
+            f"update step: {n} cells of {c} channels: too many for the 32-bit offsets of the "
+            "Triton kernels"
+        )
+
+
+_perceivers: WeakTensorKeyDictionary = WeakTensorKeyDictionary()
+_scales: WeakTensorKeyDictionary = WeakTensorKeyDictionary()
+
+
+def _known(results: WeakTensorKeyDictionary, compute: Callable[[Tensor], T], of: Tensor) -> T:
+    """The result for a tensor, computed once: all steps of a rollout share table and filters."""
+    if of not in results:
+        results[of] = compute(of)
+    return results[of]
+
+
+def _read_scales(stencil: Tensor) -> tuple[float, ...]:
+    """What each filter is a multiple of the kernels' whole numbers by; waits for the GPU."""
+    given = stencil.detach().cpu().double().numpy()
+    forms = filters(sobel_divisor=1, laplacian_divisor=1).astype(np.float64)
+    if given.shape == forms.shape:
+        scales = (given * forms).sum(axis=1) / (forms**2).sum(axis=1)
+        if np.allclose(given, scales[:, None] * forms, rtol=1e-6, atol=0):
+            return tuple(scales.tolist())
+    raise ShapeError(
+        "update step: stencil: the Triton kernels know only multiples of the identity, the three "
+        "Sobel filters and the 27-point Laplacian"
+    )

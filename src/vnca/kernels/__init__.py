@@ -1,1 +1,0 @@
-"""Numerical kernels, one folder an operation."""

@@ -1,1 +1,0 @@
-"""What is seen at points between the cells of a state."""

@@ -1,0 +1,1 @@
+"""Meshes: unwrapping, rasterising, baking, turning."""

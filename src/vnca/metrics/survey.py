@@ -1,0 +1,192 @@
+"""All measures of a painted sequence, in one pass over its frames."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vnca.core.errors import GridError
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
+from vnca.metrics.coherence import Agreement, Coherence, Step, around
+from vnca.metrics.density import DensityChange
+from vnca.metrics.estimators import Estimator, estimators
+from vnca.metrics.judges import Judge
+from vnca.metrics.likeness import SIDES, Likeness, joined_likeness, likeness
+from vnca.metrics.motion import (
+    MotionMeasures,
+    measure_carried_noise,
+    measure_drift,
+    measure_motion,
+)
+from vnca.metrics.stage import Coloured, Pair, Sight, Stage
+from vnca.metrics.style import StyleGauge
+from vnca.painting.roll import Painting
+from vnca.rule.rule import Rule
+
+RING = tuple(Sight(15.0 * turn, 10.0) for turn in range(24))
+"""Views all around the smoke."""
+POLES = tuple(
+    Sight(azimuth, elevation)
+    for elevation in (60.0, -60.0)
+    for azimuth in (0.0, 90.0, 180.0, 270.0)
+)
+"""Views from above and below."""
+FILM = Sight(0.0, 10.0)
+"""From where the frames are compared with each other."""
+STYLE_FRAMES = 5
+"""Frames that are compared with the picture."""
+STRIP_FRAMES = 8
+"""Frames of which pictures are kept."""
+MOTION_SIZE = 128
+"""Rows and columns of the pictures in which motion is looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Still:
+    """A frame of the film.
+
+    Attributes:
+        frame: Its number.
+        pair: What is seen of it.
+        difference: Where it disagrees with the frame before, `[r, c]`; see `Coherence`.
+    """
+
+    frame: int
+    pair: Pair
+    difference: FloatArray | None
+
+
+@dataclass(frozen=True)
+class TextureMotion:
+    """How the texture of the rule moves on one frame that is held still.
+
+    Attributes:
+        rule: What was measured.
+        carried: The same of noise that the velocity carries: what can be measured at best.
+        drift: L_dir and L_mag of a texture that moves as one.
+    """
+
+    rule: MotionMeasures
+    carried: MotionMeasures
+    drift: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """One frame, looked at from all sides.
+
+    Attributes:
+        frame: Its number.
+        ring: Its views all around, and from above and below.
+        likeness: How much they look like the picture.
+        around: How the views all around agree with their neighbours.
+        texture: How the texture moves, or why that is not known.
+    """
+
+    frame: int
+    ring: tuple[Pair, ...]
+    likeness: Likeness
+    around: Agreement | None
+    texture: TextureMotion | str
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What was found.
+
+    Attributes:
+        frames: Numbers of the frames painted.
+        style: The likeness of four sides of some frames, by frame; at least of one.
+        judges: What networks say of the same.
+        turn: The middle frame.
+        steps: How each frame agrees with those before.
+        density: How each frame's density changes.
+        strip: Some frames of the film.
+    """
+
+    frames: tuple[int, ...]
+    style: dict[int, Likeness]
+    judges: tuple[Judge, ...]
+    turn: Turn
+    steps: tuple[Step, ...]
+    density: tuple[DensityChange, ...]
+    strip: tuple[Still, ...]
+
+
+def survey(
+    paintings: Iterable[Painting],
+    count: int,
+    rule: Rule,
+    stage: Stage,
+    gauge: StyleGauge,
+    judges: Sequence[Judge] = (),
+) -> Survey:
+    """Measure a sequence while it is painted; no more than a few frames are kept at a time.
+
+    Args:
+        paintings: Its frames in order.
+        count: How many there are, one at least.
+        rule: What paints them.
+        stage: How they are looked at.
+        gauge: What they are compared with.
+        judges: Networks that compare them with it, too.
+
+    Raises:
+        GridError: If the smoke of the middle frame is opaque nowhere.
+        BackendUnavailableError: If OpenCV is not installed.
+    """
+    seen_by = estimators()
+    coherence = Coherence(seen_by["dis"])
+    frames, density, strip, style, turn = [], [], [], {}, None
+    kept, compared = _spread(count, STRIP_FRAMES), _spread(count, STYLE_FRAMES)
+    for at, painting in enumerate(paintings):
+        smoke = painting.smoke
+        painted, plain = Coloured.painted(painting), Coloured.plain(smoke)
+        frames.append(smoke.frame)
+        density.append(DensityChange.of(painting))
+        film = stage.look_twice(painted, plain, FILM)
+        coherence.add(smoke.frame, film, stage.motion(smoke, FILM))
+        if at in kept:
+            strip.append(Still(smoke.frame, film, coherence.difference))
+        if at in compared:
+            pairs = [stage.look_twice(painted, plain, sight) for sight in SIDES]
+            if (found := likeness(gauge, pairs)) is not None:
+                style[smoke.frame] = found
+                for judge in judges:
+                    judge.look(smoke.frame, pairs, gauge)
+        if at == count // 2:
+            ring = tuple(stage.look_twice(painted, plain, sight) for sight in (*RING, *POLES))
+            turn = Turn(
+                smoke.frame,
+                ring,
+                joined_likeness([likeness(gauge, ring)]),
+                around(stage, ring[: len(RING)]),
+                _texture(rule, smoke, seen_by),
+            )
+    assert turn is not None, "there are fewer paintings than was said"
+    return Survey(
+        tuple(frames),
+        style or {turn.frame: turn.likeness},
+        tuple(judges),
+        turn,
+        coherence.steps,
+        tuple(density),
+        tuple(strip),
+    )
+
+
+def _texture(rule: Rule, smoke: Volume, seen_by: Mapping[str, Estimator]) -> TextureMotion | str:
+    try:
+        return TextureMotion(
+            measure_motion(rule, smoke, seen_by, size=MOTION_SIZE),
+            measure_carried_noise(rule, smoke, seen_by, size=MOTION_SIZE),
+            measure_drift(rule, smoke, size=MOTION_SIZE),
+        )
+    except GridError as error:  # without velocity, or at rest
+        return str(error)
+
+
+def _spread(count: int, wanted: int) -> set[int]:
+    """Up to so many places of `count`, evenly spread, the last among them."""
+    return set(np.linspace(0, count - 1, min(count, wanted) + 1)[1:].round().astype(int).tolist())

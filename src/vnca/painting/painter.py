@@ -1,0 +1,259 @@
+"""Painting a sequence of files: when one of them is broken, and going on after an end."""
+
+import time
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from vnca.core.errors import (
+    FileFormatError,
+    GridError,
+    OptionError,
+    OutputError,
+    ShapeError,
+    VncaError,
+)
+from vnca.core.files import existing_file, remove_file, remove_leftovers
+from vnca.core.lattice import Lattice
+from vnca.core.volume import Volume
+from vnca.io.provenance import Provenance
+from vnca.io.sequence import Frame, FrameSequence
+from vnca.io.smoke import SmokeFormat, missing_velocity, read_smoke, write_painted
+from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
+from vnca.painting.ahead import read_ahead
+from vnca.painting.roll import Roll, RollState
+from vnca.painting.unfinished import Source, Unfinished
+
+OnError = Literal["stop", "skip", "hold"]
+BROKEN = (FileFormatError, GridError, ShapeError)
+"""What a frame is that cannot be read, or is another than it was a moment ago."""
+_SAVING_SHARE = 0.02
+"""Share of the time that may go into keeping the state."""
+
+
+class _Read(NamedTuple):
+    """Smoke, as fine as it is painted, and where it is from."""
+
+    source: Source
+    frame: Frame
+    smoke: Volume
+
+
+@dataclass(frozen=True, eq=False)
+class Painter:
+    """Paints the files of a sequence, one after the other, so that it can go on after any end.
+
+    A frame is written whole, then the state it left behind, every now and then: after an end
+    at any moment, the frames since are painted again to the same bytes.
+
+    Attributes:
+        sequence: What to paint.
+        out: Folder for the painted frames.
+        roll: The rule, ready for the sequence.
+        lattice: Whose cells all frames are painted on.
+        smoke: How smoke is read.
+        colour_grids: Names for the colour.
+        on_error: With a broken frame: stop; leave it out; or paint the one before it again.
+        conditions: What else must be the same for a painting to be gone on with: its bytes
+            follow from these, the sequence, the rule and nothing else.
+        tell: Is given lines for the user.
+        refine: How many times as fine as the smoke's the grid of the painting is; what the roll
+            paints is refined smoke.
+        facts: What else files tell of their painting, beside how opaque it is to be seen.
+    """
+
+    sequence: FrameSequence
+    out: Path
+    roll: Roll
+    lattice: Lattice
+    smoke: SmokeFormat
+    colour_grids: Sequence[str]
+    on_error: OnError
+    conditions: Mapping[str, Any]
+    tell: Callable[[str], None]
+    refine: int = 1
+    facts: Mapping[str, str | int | float] = field(default_factory=dict)
+    _told: set[str] = field(default_factory=set, init=False)
+
+    @property
+    def unfinished_path(self) -> Path:
+        """Where the state is kept: named after the first frame, as several may share a folder."""
+        return self.out / f".{self.sequence[0].path.stem}.resume.safetensors"
+
+    def target(self, frame: Frame) -> Path:
+        """The file a frame is painted to."""
+        return self.out / f"{frame.path.stem}.vdb"
+
+    def begin(self, *, resume: bool) -> Unfinished:
+        """Where to start: at the first frame, or where an earlier run ended.
+
+        Raises:
+            OptionError: If it ended under other conditions.
+            FileFormatError: If its state is damaged.
+            OutputError: If the folder cannot be written.
+        """
+        path = self.unfinished_path
+        remove_leftovers(self.out, {self.target(f).name for f in self.sequence} | {path.name})
+        if path.exists() and resume:
+            unfinished = Unfinished.load(path, self.conditions, self.roll)
+            self._require_unchanged(unfinished.sources)
+            self.tell(f"{self.out}: going on after {len(unfinished.sources)} frames")
+            return unfinished
+        if path.exists():
+            self.tell(f"{self.out}: starting anew; --resume goes on with the painting there")
+        elif resume:
+            self.tell(f"{self.out}: nothing unfinished there; starting with the first frame")
+        return Unfinished(self.conditions, (), self.roll.start())
+
+    def paint(self, unfinished: Unfinished) -> Generator[Path | None, None, None]:
+        """Go on from there to the end of the sequence.
+
+        Yields:
+            The file of each frame, also of those already finished; None for one left out. Close
+            the iterator to keep the state.
+
+        Raises:
+            VncaError: If a file cannot be written, or a broken frame is to stop the painting.
+        """
+        sources, state = list(unfinished.sources), unfinished.state
+        saved, due, start = len(sources), 0.0, len(sources)
+        held = self._held(sources)
+        for frame, source in zip(self.sequence, sources, strict=False):
+            yield self.target(frame) if source else None
+        loads = (partial(self._read, at) for at in range(start, len(self.sequence)))
+        try:
+            for frame, read in zip(self.sequence[start:], read_ahead(loads), strict=True):
+                held, state, source = self._finish(frame, read, held, state)
+                sources.append(source)
+                if time.monotonic() >= due:
+                    begun = time.monotonic()
+                    Unfinished(self.conditions, tuple(sources), state).save(self.unfinished_path)
+                    saved, ended = len(sources), time.monotonic()
+                    due = ended + (ended - begun) / _SAVING_SHARE
+                yield self.target(frame) if source else None
+        finally:
+            if len(sources) > saved:
+                with suppress(OutputError):
+                    Unfinished(self.conditions, tuple(sources), state).save(self.unfinished_path)
+
+    def discard(self) -> None:
+        """Forget the state: there is nothing to go on with."""
+        remove_file(self.unfinished_path)
+
+    def _finish(
+        self, frame: Frame, read: _Read | VncaError, held: _Read | None, state: RollState
+    ) -> tuple[_Read | None, RollState, Source | None]:
+        """Paint a frame or do what is to be done if it is broken."""
+        try:
+            if isinstance(read, VncaError):
+                raise read
+            state = self._write(frame, read, state)
+            return read if self.on_error == "hold" else None, state, read.source
+        except BROKEN as error:
+            if self.on_error == "stop":
+                raise
+            if self.on_error == "hold" and held is not None:
+                self.tell(f"{error}; holding frame {held.frame.number} in its place")
+                return held, self._write(frame, held, state), held.source
+            self.tell(f"{error}; leaving it out")
+            remove_file(self.target(frame))
+            return held, state, None
+
+    def _write(self, frame: Frame, read: _Read, state: RollState) -> RollState:
+        """Paint smoke to the file of a frame; the state after it."""
+        self._tell_without_velocity(read)
+        painting = self.roll.paint(read.smoke, state)
+        if frame == self.sequence[0]:
+            # From here on, frames of an earlier painting are overwritten.
+            self.discard()
+        write_painted(
+            self.target(frame),
+            read.frame.path,
+            self.smoke,
+            density=painting.density_field,
+            colour=painting.colour_field,
+            box=read.smoke.box,
+            lattice=self.lattice,
+            colour_grids=self.colour_grids,
+            refine=self.refine,
+            provenance=self._provenance(read),
+        )
+        return painting.state
+
+    def _tell_without_velocity(self, read: _Read) -> None:
+        """Say once that the rule wants a velocity which a frame does not have."""
+        if (
+            self.roll.rule.config.velocity_prior
+            and self.smoke.velocity_grid != NO_VELOCITY
+            and read.smoke.velocity_field is None
+            and not read.smoke.box.is_empty
+            and "velocity" not in self._told
+        ):
+            self._told.add("velocity")
+            missing = missing_velocity(read.frame.path)
+            self.tell(f"{missing}; frames without are painted as if their smoke rested")
+
+    def _provenance(self, read: _Read) -> Provenance:
+        """What the painting of a frame tells of itself."""
+        scales = self.roll.rule.scales
+        return Provenance(
+            scales.extinction(read.smoke.cell_length),
+            scales.gamma * self.refine,
+            up_axis_of(read.frame.path, self.smoke),
+            self.facts,
+        )
+
+    def _read(self, at: int) -> _Read | VncaError:
+        """A frame of the sequence, or what is wrong with it."""
+        frame = self.sequence[at]
+        try:
+            status = existing_file(frame.path).stat()
+            smoke = read_smoke(
+                frame.path, self.smoke, frame=frame.number, lattice=self.lattice
+            ).refined(self.refine)
+        except BROKEN as error:
+            return error
+        except OSError as error:
+            return FileFormatError(f"{frame.path}: cannot be read ({error.strerror})")
+        if self.roll.box.union(smoke.box) != self.roll.box:
+            return GridError(
+                f"{frame.path}: has changed since the start and now has smoke beyond the box of "
+                "the sequence; start anew"
+            )
+        return _Read(Source(at, status.st_size, status.st_mtime_ns), frame, smoke)
+
+    def _held(self, sources: Sequence[Source | None]) -> _Read | None:
+        """The last frame that was not broken, where it may be wanted again."""
+        last = next((source for source in reversed(sources) if source), None)
+        if self.on_error != "hold" or last is None:
+            return None
+        read = self._read(last.frame)
+        if isinstance(read, VncaError):
+            raise read
+        return read
+
+    def _require_unchanged(self, sources: Sequence[Source | None]) -> None:
+        """Refuse to go on unless finished frames and what they were painted from are there."""
+        if len(sources) > len(self.sequence) or any(
+            source and not 0 <= source.frame <= at for at, source in enumerate(sources)
+        ):
+            raise FileFormatError(
+                f"{self.unfinished_path}: damaged (its frames are not those of the sequence); "
+                "start anew without --resume"
+            )
+        for frame, source in zip(self.sequence, sources, strict=False):
+            if source is None:
+                continue
+            if not self.target(frame).exists():
+                raise OptionError(
+                    f"{self.target(frame)}: was finished but is gone; start anew without --resume"
+                )
+            origin = self.sequence[source.frame].path
+            status = existing_file(origin).stat()
+            if (status.st_size, status.st_mtime_ns) != source[1:]:
+                raise OptionError(
+                    f"{origin}: has changed since it was painted; start anew without --resume"
+                )

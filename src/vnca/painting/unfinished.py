@@ -1,0 +1,121 @@
+"""How far the painting of a sequence has come, in a small file beside it: data, never code."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+from vnca.core.errors import FileFormatError, OptionError
+from vnca.core.files import existing_file, whole_file
+from vnca.painting.roll import Roll, RollState
+
+_METADATA = "vnca"
+_LONGEST_VALUE = 40
+
+
+class Source(NamedTuple):
+    """The file a finished frame was painted from, as it was then."""
+
+    frame: int
+    """Which one of the sequence, counted from 0: the frame's own, or an earlier one held."""
+    size: int
+    """Bytes."""
+    changed: int
+    """When it was changed last, nanoseconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unfinished:
+    """A painting as its last finished frame left it.
+
+    Attributes:
+        conditions: What must be the same to go on, by the name a user knows it by; JSON values.
+        sources: Of each finished frame, from the first; None for one that was left out.
+        state: What the next frame goes on from.
+    """
+
+    conditions: Mapping[str, Any]
+    sources: tuple[Source | None, ...]
+    state: RollState
+
+    def save(self, path: Path) -> None:
+        """Write it, whole or not at all.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        described = {
+            "conditions": self.conditions,
+            "sources": self.sources,
+            "steps_done": self.state.steps_done,
+        }
+        tensors = {
+            "cells": np.ascontiguousarray(self.state.cells),
+            "values": np.ascontiguousarray(self.state.values[:-1]),
+        }
+        with whole_file(path) as temporary:
+            # Not by safetensors itself, which has an error of its own for a full disk.
+            temporary.write_bytes(save(tensors, {_METADATA: json.dumps(described)}))
+
+    @classmethod
+    def load(cls, path: Path, conditions: Mapping[str, Any], roll: Roll) -> "Unfinished":
+        """Read it, if it can be gone on from under these conditions.
+
+        Raises:
+            OptionError: If another condition held when the painting was begun.
+            FileFormatError: If the file is missing or damaged.
+        """
+        path = existing_file(path)
+        try:
+            with safe_open(path, framework="numpy") as file:
+                described = json.loads((file.metadata() or {})[_METADATA])
+                _require_same(path.parent, described["conditions"], conditions)
+                sources = tuple(s and Source(*map(int, s)) for s in described["sources"])
+                state = _state(
+                    file.get_tensor("cells"),
+                    file.get_tensor("values"),
+                    int(described["steps_done"]),
+                    roll,
+                )
+        except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
+            raise FileFormatError(
+                f"{path}: damaged ({error}); start anew without --resume"
+            ) from error
+        return cls(conditions, sources, state)
+
+
+def _require_same(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    # As they come back from JSON, where tuples are lists.
+    now = json.loads(json.dumps(now))
+    for name in {**now, **before}:
+        was, is_now = (json.dumps(values.get(name)) for values in (before, now))
+        if was != is_now:
+            is_short = len(was) + len(is_now) <= _LONGEST_VALUE
+            raise OptionError(
+                f"{folder}: cannot go on, since {name} is another than when the painting was begun"
+                f"{f' ({was}, now {is_now})' * is_short}; make it the same or start anew without "
+                "--resume"
+            )
+
+
+def _state(cells: Any, values: Any, steps_done: int, roll: Roll) -> RollState:
+    """The state, after a look at what a damaged file could do harm with.
+
+    Raises:
+        ValueError: If it does not fit the rule and the box of the sequence.
+    """
+    box = roll.box.grown(roll.rule.config.reach)
+    shapes = (len(cells), 3), (len(cells), roll.rule.config.channels)
+    if (cells.shape, values.shape) != shapes or steps_done < 0:
+        raise ValueError(f"cells {cells.shape} with values {values.shape}, steps {steps_done}")
+    if (cells.dtype, values.dtype) != (np.int32, np.float32):
+        raise ValueError(f"cells {cells.dtype} with values {values.dtype}")
+    if len(cells) and not ((cells >= box.lower) & (cells < box.upper)).all():
+        raise ValueError(f"cells beyond {box}")
+    outside = np.zeros((1, values.shape[1]), dtype=np.float32)
+    return RollState(cells, np.concatenate([values, outside]), steps_done)

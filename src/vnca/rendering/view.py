@@ -1,0 +1,170 @@
+"""A picture of a coloured volume, differentiable in its density and colour."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from vnca.core.camera import Camera
+from vnca.core.errors import OptionError, ShapeError
+from vnca.core.typing import AnyArray
+from vnca.rendering.composite import gather, ray_weights
+from vnca.rendering.march import march
+from vnca.rendering.paper import paper_weights
+from vnca.rendering.sample import sample
+
+Mode = Literal["sane", "paper"]
+
+# Density this thin is invisible; below it a colour is no longer divided out.
+_THINNEST = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What a camera sees.
+
+    Attributes:
+        colour: `[rows, columns, 3]`, linear RGB, premultiplied by opacity.
+        opacity: `[rows, columns]`, in [0, 1].
+        depth: `[rows, columns]`, mean depth along the ray of the smoke seen, in the camera's
+            lengths; infinite where there is none.
+    """
+
+    colour: Float[Tensor, "rows columns 3"]
+    opacity: Float[Tensor, "rows columns"]
+    depth: Float[Tensor, "rows columns"]
+
+    def over(self, background: Tensor | Sequence[float]) -> Float[Tensor, "rows columns 3"]:
+        """The view in front of a linear RGB colour or picture `[..., 3]`. Differentiable."""
+        behind = torch.as_tensor(background, dtype=self.colour.dtype, device=self.colour.device)
+        return self.colour + (1 - self.opacity)[..., None] * behind
+
+    @property
+    def rgba(self) -> Float[Tensor, "rows columns 4"]:
+        """Premultiplied linear RGB and opacity."""
+        return torch.cat([self.colour, self.opacity[..., None]], -1)
+
+
+def render(
+    density: Float[Tensor, "x y z"],
+    colour: Float[Tensor, "x y z 3"],
+    camera: Camera,
+    *,
+    rows: int,
+    columns: int,
+    gamma: float,
+    step: float = 1.0,
+    offset: float = 0.0,
+    mode: Mode = "sane",
+    cells_to_world: AnyArray | None = None,
+) -> View:
+    """Render smoke by emission and absorption.
+
+    Differentiable in `density` and `colour`, except for cells further than a cell from any
+    smoke: rays are not sampled there. Deterministic bit for bit on the CPU.
+
+    Density and density times colour are interpolated, and the colour of a sample is their
+    quotient: so what colour the empty cells around the smoke have is of no effect.
+
+    Lengths are those of the space the camera is in, whatever the shape of the cells: what a slab
+    of smoke absorbs depends on how thick it is there, not on how many cells it is divided into.
+
+    Args:
+        density: max(d (1 + Δd), 0), non-negative.
+        colour: Linear RGB.
+        camera: Where to look from, in the space that `cells_to_world` leads to.
+        rows: Height of the picture, pixels.
+        columns: Width of the picture, pixels.
+        gamma: Extinction of density one, 1/length.
+        step: Length between samples along a ray; one in paper mode.
+        offset: Shift of all samples along their rays, in steps, in [0, 1). Training draws it.
+        mode: "sane" for the emission–absorption integral, "paper" for the paper's integrand.
+        cells_to_world: 4×4, affine and invertible, from cell coordinates of these arrays (cell
+            `[i, j, k]` at (i, j, k)) to where the camera is. The same unless given: lengths are
+            then in cells.
+
+    Raises:
+        ShapeError: If density and colour do not cover the same cells.
+        OptionError: If an option is out of range.
+    """
+    _check(density, colour, rows, columns, gamma, step, offset, mode)
+    origins, directions = (
+        density.new_tensor(array).view(-1, 3)
+        for array in _through_cells(*camera.rays(rows, columns), cells_to_world)
+    )
+    field = torch.cat([density[..., None], density[..., None] * colour], dim=-1)
+    pixels, colours, opacities, depths = [], [], [], []
+    for samples in march(density, origins, directions, near=camera.near, step=step, offset=offset):
+        values = samples.table(sample(field, samples.points))
+        thickness = values[..., 0]
+        hue = values[..., 1:] / thickness[..., None].clamp_min(_THINNEST)
+        if mode == "paper":
+            weights, transmittance = paper_weights(thickness, gamma=gamma)
+        else:
+            weights, transmittance = ray_weights(gamma * thickness, step=step)
+        pixels.append(samples.ray)
+        colours.append(gather(weights, hue))
+        opacities.append(1 - transmittance)
+        depths.append(_mean_depth(weights, samples.depth))
+    return View(
+        _picture(pixels, colours, density.new_zeros(rows * columns, 3)).view(rows, columns, 3),
+        _picture(pixels, opacities, density.new_zeros(rows * columns)).view(rows, columns),
+        _picture(pixels, depths, density.new_full((rows * columns,), math.inf)).view(rows, columns),
+    )
+
+
+def _through_cells(
+    origins: AnyArray, directions: AnyArray, cells_to_world: AnyArray | None
+) -> tuple[AnyArray, AnyArray]:
+    """Rays `point = origin + depth · direction` of the world, in cells; depths stay as they are."""
+    if cells_to_world is None:
+        return origins, directions
+    to_cells = np.linalg.inv(cells_to_world[:3, :3])
+    return (origins - cells_to_world[:3, 3]) @ to_cells.T, directions @ to_cells.T
+
+
+def _mean_depth(weights: Tensor, depth: Tensor) -> Tensor:
+    total = weights.sum(1)
+    mean = (weights * depth).sum(1) / total.clamp_min(_THINNEST)
+    return torch.where(total > _THINNEST, mean, math.inf)
+
+
+def _picture(pixels: list[Tensor], values: list[Tensor], empty: Tensor) -> Tensor:
+    """`empty` with the values of the pixels that see smoke."""
+    if not pixels:
+        return empty
+    return empty.index_put((torch.cat(pixels),), torch.cat(values))
+
+
+def _check(
+    density: Tensor,
+    colour: Tensor,
+    rows: int,
+    columns: int,
+    gamma: float,
+    step: float,
+    offset: float,
+    mode: str,
+) -> None:
+    if density.ndim != 3 or colour.shape != (*density.shape, 3):
+        raise ShapeError(
+            "volume to render: expected density [x, y, z] and colour [x, y, z, 3], "
+            f"got {tuple(density.shape)} and {tuple(colour.shape)}"
+        )
+    if min(rows, columns) < 1:
+        raise OptionError(f"picture size: expected at least 1×1 pixels, got {columns}×{rows}")
+    if not gamma >= 0:
+        raise OptionError(f"gamma: expected 0 or more, got {gamma}")
+    if not step > 0:
+        raise OptionError(f"step: expected more than 0, got {step}")
+    if not 0 <= offset < 1:
+        raise OptionError(f"offset: expected 0 to less than 1, got {offset}")
+    if mode not in ("sane", "paper"):
+        raise OptionError(f"mode: expected sane or paper, got {mode}")
+    if mode == "paper" and step != 1:
+        raise OptionError(f"step: the paper's integrand is defined for a step of 1, got {step}")

@@ -1,0 +1,207 @@
+"""The model file: a rule as safetensors with JSON metadata. Data only, never code."""
+
+import dataclasses
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+import vnca
+from vnca.core.errors import ModelError, OptionError, ShapeError
+from vnca.core.files import existing_file, whole_file
+from vnca.core.lattice import Lattice, Region
+from vnca.core.typing import Box, FloatArray
+from vnca.engine.decode_weights import Weights
+from vnca.rule.decoder import Decoder
+from vnca.rule.rule import Rule, RuleConfig, Scales
+
+FORMAT_VERSION = 2
+"""The newest that is read; a model is written in the oldest that holds it, 2 with a decoder."""
+MODEL_NAME = "model.safetensors"
+"""Name of the model in a run folder."""
+
+_METADATA = "vnca"
+_WEIGHTS = ("hidden", "bias", "output")
+_STYLE = "style"
+_DECODER = tuple(f"decoder.{name}" for name in Weights._fields)
+_FARTHEST = 1e30  # in the world, or of a cell's size
+_EXACT = 2**53  # whole numbers up to here are floats
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A rule with its provenance.
+
+    Attributes:
+        rule: The rule.
+        training: How it came about: style, features, preset, iterations, seed, …; JSON values.
+        style: sRGB thumbnail `[r, c, 3]` of the style picture, uint8, or None.
+        version: The `vnca` that wrote the file.
+    """
+
+    rule: Rule
+    training: dict[str, Any] = field(default_factory=dict)
+    style: NDArray[np.uint8] | None = None
+    version: str = vnca.__version__
+
+    def save(self, path: Path) -> None:
+        """Write the model file, whole or not at all.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        decoder = self.rule.decoder
+        weights = {name: getattr(self.rule, name) for name in _WEIGHTS}
+        weights |= dict(zip(_DECODER, decoder.weights, strict=True)) if decoder else {}
+        tensors: dict[str, NDArray[Any]] = {
+            name: np.ascontiguousarray(array, dtype=np.float32) for name, array in weights.items()
+        }
+        if self.style is not None:
+            tensors[_STYLE] = np.ascontiguousarray(self.style)
+        # One entry: safetensors keeps several in no order, and equal models are equal bytes.
+        metadata = {
+            _METADATA: json.dumps(
+                {
+                    "format_version": 1 if decoder is None else 2,
+                    "version": self.version,
+                    "rule": dataclasses.asdict(self.rule.config),
+                    "scales": dataclasses.asdict(self.rule.scales),
+                    **_described(self.rule.place),
+                    "training": self.training,
+                }
+            )
+        }
+        with whole_file(path) as temporary:
+            # Not by safetensors itself, which has an error of its own for a full disk.
+            temporary.write_bytes(save(tensors, metadata=metadata))
+
+    @classmethod
+    def load(cls, path: Path) -> "Model":
+        """Read a model file, or the model in a run folder.
+
+        Raises:
+            FileFormatError: If the file is missing or empty.
+            ModelError: If it is not a model, of a newer format, or inconsistent.
+        """
+        path = Path(path)
+        if path.is_dir():
+            if not (path / MODEL_NAME).exists():
+                raise ModelError(f"{path}: no {MODEL_NAME} in this folder; is it a training run?")
+            path = path / MODEL_NAME
+        existing_file(path)
+        try:
+            with safe_open(path, framework="numpy") as file:
+                metadata = file.metadata() or {}
+                expected = {*_WEIGHTS, *_DECODER, _STYLE}
+                known = [name for name in file.keys() if name in expected]  # noqa: SIM118
+                tensors = {name: file.get_tensor(name) for name in known}
+        # Types that numpy lacks raise the last two.
+        except (SafetensorError, OSError, ValueError, TypeError, AttributeError) as error:
+            raise ModelError(f"{path}: not a vnca model ({error})") from error
+        if _METADATA not in metadata:
+            raise ModelError(f"{path}: a safetensors file, but not a vnca model")
+        try:
+            described = json.loads(metadata[_METADATA])
+            _check_format(path, described["format_version"])
+            rule = Rule(
+                **{name: _single_precision(name, tensors[name]) for name in _WEIGHTS},
+                config=from_record(RuleConfig, described["rule"]),
+                scales=from_record(Scales, described["scales"]),
+                place=_place(described.get("place")),
+                decoder=_decoder(tensors),
+            )
+            training, version = dict(described["training"]), str(described["version"])
+        except (KeyError, TypeError, ValueError, RecursionError, OptionError) as error:
+            raise ModelError(f"{path}: damaged model metadata ({error})") from error
+        except ShapeError as error:
+            raise ModelError(f"{path}: {error}") from error
+        style = tensors.get(_STYLE)
+        if style is not None and (style.dtype != np.uint8 or style.shape[2:] != (3,)):
+            raise ModelError(f"{path}: the style thumbnail is not an 8-bit picture")
+        return cls(rule, training, style, version)
+
+
+def _decoder(tensors: dict[str, NDArray[Any]]) -> Decoder | None:
+    """All of a decoder, or none.
+
+    Raises:
+        KeyError: If there is only a part of one.
+    """
+    if tensors.keys().isdisjoint(_DECODER):
+        return None
+    return Decoder(Weights(*(_single_precision(name, tensors[name]) for name in _DECODER)))
+
+
+def _described(place: Region | None) -> dict[str, Any]:
+    if place is None:
+        return {}
+    return {"place": {"lattice_to_world": place.lattice.to_world.tolist(), "box": place.box}}
+
+
+def _place(record: Any) -> Region | None:
+    """Where a rule was trained; models that do not tell were written before they did.
+
+    Raises:
+        ValueError: If it is nowhere.
+    """
+    if record is None:
+        return None
+    to_world, box = np.array(record["lattice_to_world"], float), np.array(record["box"])
+    is_affine = to_world.shape == (4, 4) and np.array_equal(to_world[3], (0, 0, 0, 1))
+    # Not-a-numbers are not smaller either.
+    is_sound = is_affine and (np.abs(to_world) < _FARTHEST).all()
+    if not is_sound or not np.linalg.slogdet(to_world)[0]:
+        raise ValueError(f"place: lattice_to_world {record['lattice_to_world']!r}")
+    if box.shape != (2, 3) or box.dtype.kind != "i" or not (box[0] < box[1]).all():
+        raise ValueError(f"place: box {record['box']!r}")
+    (x, y, z), (u, v, w) = box.tolist()
+    return Region(Lattice(to_world), Box((x, y, z), (u, v, w)))
+
+
+def from_record(kind: type[T], record: Any) -> T:
+    """A dataclass with fields of plain types from what JSON gives for it.
+
+    Raises:
+        TypeError: If `record` is no object, or a field is unknown or of another type.
+    """
+    if not isinstance(record, dict):
+        raise TypeError(f"{kind.__name__}: expected an object, got {record!r}")
+    hints = get_type_hints(kind)
+    for name, value in record.items():
+        if name in hints and not _fits(value, hints[name]):
+            raise TypeError(f"{name}: {value!r} is of another type")
+    return kind(**record)
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    if get_origin(hint) is Literal:
+        return value in get_args(hint)
+    if alternatives := get_args(hint):
+        return any(_fits(value, alternative) for alternative in alternatives)
+    if hint is float and type(value) is int:
+        return abs(value) <= _EXACT
+    return type(value) is hint
+
+
+def _single_precision(name: str, weights: NDArray[Any]) -> FloatArray:
+    if weights.dtype.kind != "f":
+        raise ShapeError(f"weights '{name}': expected floats, got {weights.dtype}")
+    with np.errstate(over="ignore"):  # the rule refuses what is not finite
+        return weights.astype(np.float32)
+
+
+def _check_format(path: Path, version: Any) -> None:
+    if type(version) is not int or version < 1:
+        raise ValueError(f"format version {version!r}")
+    if version > FORMAT_VERSION:
+        raise ModelError(
+            f"{path}: model format {version} is newer than this vnca reads ({FORMAT_VERSION}); "
+            "upgrade vnca"
+        )

@@ -1,0 +1,174 @@
+"""The update rule of an automaton: its hyperparameters, weights and normalisers."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from vnca.core.errors import OptionError, ShapeError
+from vnca.core.lattice import Region
+from vnca.core.typing import FloatArray
+from vnca.engine.domain import DomainKind
+from vnca.engine.stencil import FILTERS
+from vnca.rule.decoder import Decoder
+
+PRIORS = 7
+"""Position (3), density (1) and velocity (3); one that is switched off is zero."""
+
+COLOUR = slice(0, 3)
+"""Channels that are shown, as sRGB minus one half."""
+DENSITY_CHANGE = 3
+"""Channel of Δd, used clamped to ±`DENSITY_LIMIT`."""
+DENSITY_LIMIT = 0.5
+
+SMOKE_THRESHOLD = 0.01
+"""Normalised density from which a cell counts as smoke; fainter smoke is not painted."""
+
+
+@dataclass(frozen=True)
+class RuleConfig:
+    """The shape of a rule."""
+
+    channels: int = 12
+    """Channels of a cell's state: colour (3), density change (1), the rest hidden."""
+    hidden: int = 96
+    """Width of the hidden layer."""
+    update_probability: float = 0.5
+    """Chance of a cell to change in a step."""
+    steps_per_frame: int = 16
+    """Steps of the automaton between two frames; the rule is taught to move at this pace."""
+    domain: DomainKind = "active"
+    """Where cells live: within reach of the smoke, or in all of its box as in the paper."""
+    reach: int = 1
+    """Cells live up to this far from the smoke; beyond is the outside that border cells see."""
+    sobel_divisor: float = 32.0
+    """Divisor of the 3×3×3 Sobel filters."""
+    laplacian_divisor: float = 26.0
+    """Divisor of the 27-point Laplacian."""
+    position_prior: bool = True
+    """Tell cells where in the box of the training they are."""
+    density_prior: bool = True
+    """Tell cells the density of the smoke."""
+    velocity_prior: bool = True
+    """Tell cells the velocity of the smoke."""
+
+    def __post_init__(self) -> None:
+        if self.channels < 4:
+            raise OptionError(f"--channels {self.channels}: at least 4 are needed (colour and Δd)")
+        if self.hidden < 1:
+            raise OptionError(f"--hidden {self.hidden}: at least 1 is needed")
+        if not 0 < self.update_probability <= 1:
+            raise OptionError(f"--update-probability {self.update_probability}: must be in (0, 1]")
+        if not 1 <= self.steps_per_frame <= 4096:
+            raise OptionError(f"--steps-per-frame {self.steps_per_frame}: must be from 1 to 4096")
+        if not 0 <= self.reach <= 64:
+            raise OptionError(f"--reach {self.reach}: must be from 0 to 64 cells")
+        if not all(0 < d < math.inf for d in (self.sobel_divisor, self.laplacian_divisor)):
+            raise OptionError("--sobel-divisor and --laplacian-divisor must be positive")
+
+    @property
+    def inputs(self) -> int:
+        """Inputs of the hidden layer: perception and priors."""
+        return FILTERS * self.channels + PRIORS
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What turns the numbers of files into the numbers a rule sees and the renderer draws."""
+
+    density: float = 1.0
+    """Density of a file that counts as 1."""
+    velocity: float = 1.0
+    """Cells per frame that count as 1."""
+    gamma: float = 1.0
+    """Extinction of density 1, per cell: the paper's brightness control."""
+
+    def __post_init__(self) -> None:
+        for name in ("density", "velocity", "gamma"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise OptionError(f"scale '{name}' {getattr(self, name)}: must be positive")
+
+    def extinction(self, cell_length: float) -> float:
+        """Of density 1 in a file, per length of its world, where cells are so long."""
+        return self.gamma / (self.density * cell_length)
+
+
+def density_scale(density: FloatArray) -> float:
+    """The density that counts as 1: the 99th percentile of what is not empty."""
+    smoke = density[density > 0]
+    return float(np.percentile(smoke, 99)) if len(smoke) else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """A rule that can be applied: s' = s + m · W2 relu(W1 [perception ‖ priors] + b1).
+
+    Attributes:
+        hidden: W1 `[hidden, 5C + 7]`.
+        bias: b1 `[hidden]`.
+        output: W2 `[C, hidden]`.
+        config: Its shape.
+        scales: Its normalisers.
+        place: Where it was trained, in which cells have a position. Without it, that is the box of
+            the domain.
+        decoder: What lets its states be seen between cells; without one they are interpolated.
+    """
+
+    hidden: FloatArray
+    bias: FloatArray
+    output: FloatArray
+    config: RuleConfig = field(default_factory=RuleConfig)
+    scales: Scales = field(default_factory=Scales)
+    place: Region | None = None
+    decoder: Decoder | None = None
+
+    def __post_init__(self) -> None:
+        expected = {
+            "hidden": (self.config.hidden, self.config.inputs),
+            "bias": (self.config.hidden,),
+            "output": (self.config.channels, self.config.hidden),
+        }
+        for name, shape in expected.items():
+            weights = getattr(self, name)
+            if weights.shape != shape:
+                raise ShapeError(f"weights '{name}': expected shape {shape}, got {weights.shape}")
+            if not np.isfinite(weights).all():
+                raise ShapeError(f"weights '{name}': not all finite")
+        if self.decoder is not None and self.decoder.channels != self.config.channels:
+            raise ShapeError(
+                f"decoder weights 'first': expected {self.config.channels} channels as the rule "
+                f"has, got {self.decoder.channels}"
+            )
+
+    @classmethod
+    def initial(cls, config: RuleConfig, scales: Scales, *, seed: int) -> "Rule":
+        """A rule before training: W1 uniform (He), b1 and W2 zero, so that nothing changes yet."""
+        bound = np.sqrt(6 / config.inputs)
+        random = np.random.default_rng(seed)
+        shape = (config.hidden, config.inputs)
+        return cls(
+            hidden=random.uniform(-bound, bound, shape).astype(np.float32),
+            bias=np.zeros(config.hidden, dtype=np.float32),
+            output=np.zeros((config.channels, config.hidden), dtype=np.float32),
+            config=config,
+            scales=scales,
+        )
+
+    def refined(self, factor: int) -> "Rule":
+        """The rule for cells `factor` times as fine, where it does in a step what it did before.
+
+        Smoke crosses `factor` times as many cells in a frame, which get `factor` times as many
+        steps; a cell, so much thinner, absorbs so much less.
+        """
+        config, scales = self.config, self.scales
+        return replace(
+            self,
+            config=replace(config, steps_per_frame=factor * config.steps_per_frame),
+            scales=replace(scales, velocity=factor * scales.velocity, gamma=scales.gamma / factor),
+        )
+
+    @property
+    def weight_count(self) -> int:
+        """Number of trained weights, those of the decoder included."""
+        own = self.hidden.size + self.bias.size + self.output.size
+        return own + (self.decoder.weight_count if self.decoder else 0)

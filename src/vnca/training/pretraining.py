@@ -1,0 +1,56 @@
+"""A solid texture for the training on smoke to begin with.
+
+On smoke a rule learns first what the priors offer: a colour for each density and velocity, and
+grain. In a block, where nothing tells cells apart, it has to learn patterns; from there it goes
+on drawing them on smoke.
+"""
+
+import dataclasses
+
+from vnca.rule.rule import PRIORS, Rule
+from vnca.training.smoke_config import TrainConfig
+from vnca.training.texture_config import PRESETS, TextureConfig
+
+SHARES = {"draft": 4.0, "standard": 1.0, "paper": 0.0}
+"""Iterations on the texture for each on smoke, by preset."""
+SHAPE = ("channels", "hidden", "update_probability", "sobel_divisor", "laplacian_divisor")
+"""In what a rule must be like the texture that it begins with."""
+LARGEST_PICTURE = 128
+"""Cells along the shorter side of the picture, at most: its patterns are to fit the block."""
+
+
+def beginning_config(config: TrainConfig, share: float, picture: float) -> TextureConfig | None:
+    """How the texture is trained for a training on smoke, or None if it is not to be.
+
+    Args:
+        config: The training on smoke. The rule is as large, and the picture in cells too.
+        share: Iterations for each of that training.
+        picture: Cells along its shorter side, as the smoke is shown it.
+    """
+    iterations = round(share * config.iterations)
+    if iterations == 0:
+        return None
+    plain = PRESETS["draft"]
+    picture = min(picture, LARGEST_PICTURE)
+    return dataclasses.replace(
+        plain,
+        rule=dataclasses.replace(
+            config.rule, position_prior=False, density_prior=False, velocity_prior=False
+        ),
+        appearance=dataclasses.replace(
+            plain.appearance,
+            layers=config.appearance.layers,
+            style_scale=picture / plain.slices.size,
+        ),
+        iterations=iterations,
+        features=config.features,
+        backend=config.backend,
+        seed=config.seed,
+    )
+
+
+def deaf_to_priors(rule: Rule) -> Rule:
+    """The rule with no weight on any prior: a texture has had none to learn what they mean."""
+    hidden = rule.hidden.copy()
+    hidden[:, -PRIORS:] = 0
+    return dataclasses.replace(rule, hidden=hidden)

@@ -1,0 +1,314 @@
+"""The one frame a rule is trained on, ready for rollouts and pictures."""
+
+import copy
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from scipy.spatial.transform import Rotation
+from torch import Tensor
+
+from vnca.core.camera import Camera, Orthographic, Perspective, frame_box, turntable, world_box
+from vnca.core.errors import GridError
+from vnca.core.typing import AnyArray, Box, FloatArray
+from vnca.core.volume import Volume
+from vnca.engine.domain import Domain
+from vnca.losses.pixels import luminance
+from vnca.rendering.brightness import gamma_for_own_colour
+from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
+from vnca.rendering.velocity import projected_velocity
+from vnca.rendering.view import View, render
+from vnca.rule.conditioning import DENSITY, VELOCITY, priors, told_velocity
+from vnca.rule.conditioning import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
+from vnca.rule.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
+from vnca.training.scene import Scene
+from vnca.training.smoke_config import ViewConfig
+
+SPEEDS = (0.25, 1.5)
+"""How much slower or faster than in the frame smoke moves in a wind, at most."""
+STRONGEST = 1.5
+"""The strongest wind that carries all of the smoke along, in units of the smoke's typical speed."""
+DENSEST = 2.0
+"""How much denser, or thinner, than it is the rule is told that it is, at most."""
+PORTRAITS = ((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (30.0, 60.0))
+"""Azimuth and elevation: front, right, back and from above, degrees."""
+PORTRAIT_STEP = 0.5
+"""Distance between samples along a ray, cells: finer than in training, without terraces."""
+PORTRAIT_BACKGROUND = 0.01
+"""Linear grey behind the smoke."""
+_UPRIGHT = 1e-6
+"""Cells turned and stretched by less than this are upright cubes."""
+
+
+class SmokeSight(NamedTuple):
+    """Where smoke is looked at from.
+
+    Attributes:
+        camera: The camera.
+        offset: Shift of all samples along their rays, in steps.
+    """
+
+    camera: Camera
+    offset: float
+
+
+class SmokeScene(Scene[SmokeSight]):
+    """A frame of smoke on which states are rolled out and looked at; nothing in it changes.
+
+    Attributes:
+        view: How it is looked at.
+        winds: Whether its velocity, and the density told, are others in each variant.
+        box: The cells that hold smoke lie in it.
+        velocity: `[n, 3]`, cells per frame.
+        moves: Whether the smoke has any.
+    """
+
+    def __init__(
+        self,
+        smoke: Volume,
+        rule: Rule,
+        view: ViewConfig,
+        *,
+        winds: bool = False,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        """Prepare a frame.
+
+        Args:
+            smoke: The frame; must hold smoke.
+            rule: Its normalisers and switches are used, not its weights.
+            view: How it is looked at; gamma is the rule's.
+            winds: Whether its velocity, and the density told, are others in each variant.
+            device: Where rollouts and pictures are computed.
+
+        Raises:
+            GridError: If there is no smoke in the frame.
+        """
+        self.view = view
+        self.winds = winds
+        self.box = smoke_bounds(smoke, rule.scales.density)
+        box = self.box.grown(rule.config.reach)
+        if rule.config.domain == "box":
+            domain = Domain.filling(box)
+        else:
+            domain = Domain.around_smoke(
+                smoke.density_field,
+                threshold=SMOKE_THRESHOLD * rule.scales.density,
+                reach=rule.config.reach,
+                box=box,
+            )
+        width = view_width(self.box, smoke.index_to_world)
+        super().__init__(domain, priors(domain, smoke, rule), device, width=width)
+        self._place = _stood(smoke.index_to_world)
+        self.samples = max(domain.box.shape) / view.step
+        self.gamma = rule.scales.gamma
+        self._grey_gamma = self.gamma
+        if view.mode != "paper":
+            self._grey_gamma = gamma_for_own_colour(smoke.density / rule.scales.density)
+        density = smoke.density_field.gather(domain.cells) / rule.scales.density
+        self._density = torch.from_numpy(density.astype(np.float32)).to(device)
+        velocity = np.zeros((len(domain), 3), dtype=np.float32)
+        if smoke.velocity_field is not None:
+            velocity[:] = smoke.velocity_field.gather(domain.cells)
+        self.moves = bool(velocity.any())
+        self.velocity = torch.from_numpy(velocity).to(device)
+        self._rule = rule
+
+    def variant(self, place: int) -> "SmokeScene":
+        """The smoke in the wind of a place: faster or slower, and told to be denser or thinner.
+
+        At odd places its velocity is turned at random, too, and all of it carried along one way.
+        The rule is told the velocity of the wind, and motion is judged by it; the density that is
+        seen stays as it is.
+        """
+        if not (self.winds and self.moves):
+            return self
+        random = np.random.default_rng(place)
+        velocity = self.velocity.cpu().numpy() * random.uniform(*SPEEDS)
+        denser = DENSEST ** random.uniform(-1, 1)
+        if place % 2:
+            turn, heading = Rotation.from_quat(random.standard_normal((2, 4))).as_matrix()
+            strength = random.uniform(0, STRONGEST) * self._rule.scales.velocity
+            velocity = velocity @ turn + strength * heading[0]
+        velocity = velocity.astype(np.float32)
+        told = torch.from_numpy(told_velocity(velocity, self._rule))
+        scene = copy.copy(self)
+        scene.velocity = torch.from_numpy(velocity).to(self.velocity)
+        scene.priors = self.priors.clone()
+        scene.priors[:, VELOCITY] = told.to(self.priors)
+        if self._rule.config.density_prior:
+            density = (self._density * denser).clamp_max(TOLD_DENSITY_LIMIT)
+            scene.priors[:, DENSITY] = density[:, None]
+        return scene
+
+    def camera(
+        self, azimuth: float, elevation: float, *, aspect: float = 1.0
+    ) -> Orthographic | Perspective:
+        """A camera around the smoke, as near to its bounding box as that side allows.
+
+        It is in the world, where lengths are those of a cell.
+        """
+        return frame_box(*self._corners, azimuth, elevation, aspect=aspect)
+
+    @property
+    def _corners(self) -> tuple[list[float], list[float]]:
+        lower, upper = (np.asarray(c) - self.domain.box.lower - 0.5 for c in self.box)
+        return _around(lower, upper, self._place)
+
+    def sight(self, random: np.random.Generator) -> SmokeSight:
+        """A camera around the smoke, and where along the rays sampling begins."""
+        azimuths = self.view.azimuths
+        azimuth = float(random.choice(azimuths)) if azimuths else random.uniform(0, 360)
+        elevation = random.uniform(-self.view.elevation, self.view.elevation)
+        camera = _level_turntable(*self._corners, azimuth, elevation)
+        # Samples at random depths: no pattern can hide between them.
+        offset = float(random.uniform()) if self.view.mode == "sane" else 0.0
+        return SmokeSight(camera, offset)
+
+    def pictures(
+        self, state: Tensor, sight: SmokeSight, background: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """A view, as `Scene.pictures` has it."""
+        view = self.look(state, sight.camera, offset=sight.offset)
+        picture = linear_to_srgb(view.over(background))
+        return picture.permute(2, 0, 1)[None], view.opacity[None]
+
+    def density_pictures(self, state: Tensor, sight: SmokeSight, background: Tensor) -> Tensor:
+        """The density in grey, as `Scene.density_pictures` has it.
+
+        I = Σ d' τ over the cells of a ray, by the paper's integrand whatever that of the colours:
+        by emission and absorption, white smoke that lets nothing through is white, however dense.
+
+        Reference: VNCA, the equations for I and for L_app.
+        """
+        density = self._painted_density(state)
+        view = render(
+            density,
+            density.new_ones(1).expand(*density.shape, 3),
+            sight.camera,
+            rows=self.view.size,
+            columns=self.view.size,
+            gamma=self._grey_gamma,
+            offset=sight.offset,
+            mode="paper",
+            cells_to_world=self._place,
+        )
+        behind = srgb_to_linear(luminance(linear_to_srgb(background).view(1, 3, 1, 1))).view(3)
+        return linear_to_srgb(view.over(behind)).permute(2, 0, 1)[None]
+
+    def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
+        """Views from the front, the right, the back and above."""
+        view = dataclasses.replace(self.view, size=size)
+        if view.mode == "sane":
+            view = dataclasses.replace(view, step=PORTRAIT_STEP)
+        pictures = []
+        for azimuth, elevation in PORTRAITS:
+            seen = self.look(state, self.camera(azimuth, elevation), view)
+            pictures.append(seen.over([PORTRAIT_BACKGROUND] * 3).clamp(0, 1).cpu().numpy())
+        return pictures
+
+    def look(
+        self, state: Tensor, camera: Camera, view: ViewConfig | None = None, *, offset: float = 0.0
+    ) -> View:
+        """The smoke as `state` paints it; differentiable in the state.
+
+        `view` is that of training unless given; `offset` shifts all samples along their rays.
+        """
+        view = view or self.view
+        colour = srgb_to_linear((state[:-1, COLOUR] + 0.5).clamp(0, 1))
+        return render(
+            self._painted_density(state),
+            self.dense(colour),
+            camera,
+            rows=view.size,
+            columns=view.size,
+            gamma=self.gamma,
+            step=view.step,
+            offset=offset,
+            mode=view.mode,
+            cells_to_world=self._place,
+        )
+
+    def motion(self, state: Tensor, sight: SmokeSight, size: int) -> tuple[Tensor, Tensor]:
+        """How the smoke that `pictures` shows moves: pixels per frame `[r, c, 2]`, and opacity.
+
+        `size` is that of such a picture, rows and columns.
+        """
+        return projected_velocity(
+            self._painted_density(state),
+            self.dense(self.velocity),
+            sight.camera,
+            rows=size,
+            columns=size,
+            gamma=self.gamma,
+            step=self.view.step,
+            offset=sight.offset,
+            mode=self.view.mode,
+            cells_to_world=self._place,
+        )
+
+    def _painted_density(self, state: Tensor) -> Tensor:
+        change = state[:-1, DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
+        return self.dense(self._density * (1 + change))
+
+
+def view_width(box: Box, index_to_world: AnyArray) -> float:
+    """Cells across a view of training, the same from all sides: patterns keep their size."""
+    lower, upper = (np.asarray(corner) for corner in box)
+    return _level_turntable(*_around(lower, upper, _stood(index_to_world))).height
+
+
+def _stood(index_to_world: AnyArray) -> AnyArray | None:
+    """4×4, how cells stand in the world and what shape they have there, in lengths of a cell.
+
+    None for upright cubes, which need not be turned.
+    """
+    linear = index_to_world[:3, :3] / np.cbrt(abs(np.linalg.det(index_to_world[:3, :3])))
+    if np.allclose(linear, np.eye(3), rtol=0, atol=_UPRIGHT):
+        return None
+    place = np.eye(4)
+    place[:3, :3] = linear
+    return place
+
+
+def _around(
+    lower: AnyArray, upper: AnyArray, place: AnyArray | None
+) -> tuple[list[float], list[float]]:
+    """The box around cells, where cameras are."""
+    if place is not None:
+        lower, upper = world_box(lower, upper, place)
+    return lower.tolist(), upper.tolist()
+
+
+def _level_turntable(
+    lower: Sequence[float], upper: Sequence[float], azimuth: float = 0.0, elevation: float = 0.0
+) -> Orthographic:
+    """As near as level views allow: those from above or below may cut off corners of the box."""
+    return turntable(lower, upper, azimuth, elevation, steepest=0)
+
+
+def smoke_bounds(smoke: Volume, density_scale: float) -> Box:
+    """The box of the cells that count as smoke.
+
+    Raises:
+        GridError: If there are none.
+    """
+    cells = np.argwhere(smoke.density > SMOKE_THRESHOLD * density_scale)
+    if len(cells) == 0:
+        raise GridError(
+            f"frame {smoke.frame}: there is no smoke in it to train on; choose a later frame"
+        )
+    lower, upper = cells.min(axis=0), cells.max(axis=0) + 1
+    x, y, z = (lower + smoke.origin).tolist()
+    u, v, w = (upper + smoke.origin).tolist()
+    return Box((x, y, z), (u, v, w))
+
+
+def velocity_scale(smoke: Volume) -> float:
+    """Cells per frame that count as 1: the root mean square speed inside the smoke."""
+    if smoke.velocity is None:
+        return 1.0
+    speed = np.linalg.norm(smoke.velocity[smoke.density > 0], axis=-1)
+    return max(float(np.sqrt(np.mean(speed**2))), 1e-3) if len(speed) else 1.0

@@ -1,0 +1,158 @@
+"""The block a rule for a solid texture is trained on, ready for rollouts and pictures."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from vnca.core.camera import Orthographic
+from vnca.core.typing import BoolArray, FloatArray
+from vnca.io.mesh.mesh import Mesh
+from vnca.meshes.raster import visible
+from vnca.painting.block import block_domain
+from vnca.rendering.colour import srgb_to_linear
+from vnca.rule.rule import COLOUR, PRIORS
+from vnca.training.scene import Scene
+from vnca.training.scenes.slices import (
+    DIAGONAL,
+    Angles,
+    as_picture,
+    axis_angles,
+    oblique_angles,
+    shown,
+    slice_points,
+)
+from vnca.training.texture_config import SliceConfig
+
+MESH_VIEWS = 24
+"""Views of the mesh that training chooses from."""
+PORTRAITS: tuple[Angles, ...] = ((0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (45.0, DIAGONAL))
+"""From the front, the right and above, and across a diagonal, which training never does."""
+SPACING = 0.5
+"""Cells a pixel of a portrait shows."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshView:
+    """What a camera sees of a mesh.
+
+    Attributes:
+        points: `[n, 3]` in cells, one for each pixel that shows the mesh.
+        covered: `[r, c]`, which those are.
+    """
+
+    points: FloatArray
+    covered: BoolArray
+
+
+class Cut(NamedTuple):
+    """A picture's place in the block: a slice, or a view of the mesh.
+
+    Attributes:
+        points: In cells, `[r, c, 3]`, or `[n, 3]` of the pixels covered.
+        covered: `[r, c]`, the pixels that show the mesh; all of a slice.
+    """
+
+    points: Tensor
+    covered: Tensor | None
+
+
+class BlockScene(Scene[list[Cut]]):
+    """A block on which states are rolled out and looked at; nothing in it changes.
+
+    All its cells live; it is its own neighbour on every side. Priors are zero: a texture is the
+    same everywhere. Its rule leaves the density alone: smoke painted with it keeps its shape.
+    """
+
+    paints_density = False
+
+    def __init__(
+        self,
+        size: int,
+        slices: SliceConfig,
+        *,
+        mesh: Mesh | None = None,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        """Prepare a block.
+
+        Args:
+            size: Cells along an edge.
+            slices: How it is looked at.
+            mesh: Seen from all sides beside the slices; a pixel shows about a cell.
+            device: Where rollouts and pictures are computed.
+
+        Raises:
+            OptionError: If the size cannot work.
+        """
+        domain = block_domain(size)
+        nothing = np.zeros((len(domain), PRIORS), np.float32)
+        super().__init__(domain, nothing, device, width=float(slices.size))
+        self.slices = slices
+        self.views = mesh_views(mesh, slices.size) if mesh is not None else []
+
+    def block(self, state: Tensor) -> Tensor:
+        """Linear RGB `[x, y, z, 3]` of a state; differentiable."""
+        return self.dense(srgb_to_linear((state[:-1, COLOUR] + 0.5).clamp(0, 1)))
+
+    def sight(self, random: np.random.Generator) -> list[Cut]:
+        """Random slices, or views of the mesh."""
+        return [self._cut(random) for _ in range(self.slices.count)]
+
+    def pictures(
+        self, state: Tensor, sight: list[Cut], background: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """The slices and views, as `Scene.pictures` has it."""
+        block, size = self.block(state), self.slices.size
+        colours, opacities = [], []
+        for points, covered in sight:
+            colour, opacity = shown(block, points), block.new_ones(size, size)
+            if covered is not None:
+                colour = background.expand(size, size, 3).index_put((covered,), colour)
+                opacity = covered.to(block.dtype)
+            colours.append(as_picture(colour))
+            opacities.append(opacity)
+        return torch.cat(colours), torch.stack(opacities)
+
+    def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
+        """Slices from the front, the right and above, and across a diagonal."""
+        block = self.block(state)
+        middle = np.full(3, len(block) / 2)
+        return [
+            shown(block, slice_points(angles, middle, size=size, spacing=SPACING).to(block.device))
+            .cpu()
+            .numpy()
+            for angles in PORTRAITS
+        ]
+
+    def _cut(self, random: np.random.Generator) -> Cut:
+        device = self.priors.device
+        middle = random.uniform(0, self.domain.box.shape[0], 3)
+        if self.views and random.uniform() < self.slices.mesh:
+            view = self.views[int(random.integers(len(self.views)))]
+            points = torch.from_numpy(view.points + middle.astype(np.float32))
+            return Cut(points.to(device), torch.from_numpy(view.covered).to(device))
+        oblique = random.uniform() < self.slices.oblique
+        angles = oblique_angles(random) if oblique else axis_angles(random)
+        spacing = self.slices.zoom ** random.uniform(-1, 1)
+        points = slice_points(angles, middle, size=self.slices.size, spacing=spacing)
+        return Cut(points.to(device), None)
+
+
+def mesh_views(mesh: Mesh, size: int) -> list[MeshView]:
+    """A mesh from all sides, a cell a pixel: the mesh as large as the picture allows."""
+    low, high = mesh.bounds
+    diameter = float(np.linalg.norm(high - low))
+    points = np.concatenate([surface.points for surface in mesh.surfaces])
+    points = (points - (low + high) / 2) * (size / diameter)
+    counts = np.cumsum([0, *(len(surface.points) for surface in mesh.surfaces)])
+    faces = np.concatenate([s.faces + n for s, n in zip(mesh.surfaces, counts, strict=False)])
+    views, random = [], np.random.default_rng(0)
+    for _ in range(MESH_VIEWS):
+        angles = random.uniform(0, 360), float(np.degrees(np.arcsin(random.uniform(-1, 1))))
+        camera = Orthographic((0.0, 0.0, 0.0), *angles, height=size)
+        seen = visible(points, faces, camera, rows=size, columns=size)
+        views.append(MeshView(seen.interpolate(points, faces).astype(np.float32), seen.covered))
+    return views

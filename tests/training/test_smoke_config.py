@@ -1,0 +1,65 @@
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from vnca.core.errors import OptionError
+from vnca.training.config import PoolConfig
+from vnca.training.smoke_config import PRESETS, TrainConfig, ViewConfig
+
+
+@pytest.mark.parametrize(
+    ("config", "option", "value"),
+    [
+        (TrainConfig, "iterations", 0),
+        (TrainConfig, "learning_rate", 0.0),
+        (TrainConfig, "learning_rate", math.nan),
+        (TrainConfig, "decay", math.inf),
+        (TrainConfig, "milestones", (100.0, 200.0)),
+        (TrainConfig, "shortest_rollout", 0),
+        (TrainConfig, "overflow", math.nan),
+        (TrainConfig, "seed", -1),
+        (TrainConfig, "seed", 2**64),
+        (ViewConfig, "size", 31),
+        (ViewConfig, "azimuths", (0.0, 361.0)),
+        (ViewConfig, "azimuths", (math.nan,)),
+        (ViewConfig, "elevation", 91.0),
+        (ViewConfig, "step", math.nan),
+        (ViewConfig, "cell_opacity", 1.0),
+        (ViewConfig, "gamma", math.inf),
+        (PoolConfig, "size", 0),
+        (PoolConfig, "reseed_every", 0),
+        (PoolConfig, "limit", math.nan),
+    ],
+)
+def test_values_that_cannot_work_are_refused_by_the_name_of_their_option(
+    config: type, option: str, value: Any
+) -> None:
+    with pytest.raises(OptionError, match=f"{option.replace('_', '-')}"):
+        config(**{option: value})
+
+
+def test_a_rollout_is_not_shorter_than_its_shortest() -> None:
+    with pytest.raises(OptionError, match="--longest-rollout"):
+        TrainConfig(shortest_rollout=9, longest_rollout=8)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_can_be_changed_and_still_works(preset: str) -> None:
+    assert replace(PRESETS[preset], seed=1) != PRESETS[preset]
+
+
+def test_the_paper_preset_is_the_papers() -> None:
+    paper = PRESETS["paper"]
+    assert paper.view.mode == "paper"
+    assert paper.appearance.pixels == 0
+    assert paper.rule.position_prior
+
+
+def test_the_learning_rate_rises_to_its_height_and_falls_at_each_milestone() -> None:
+    config = TrainConfig(
+        iterations=10, learning_rate=0.8, rate_warmup=3, milestones=(0.5, 0.8), decay=0.5
+    )
+    rates = [config.rate(iteration) for iteration in range(10)]
+    assert rates == pytest.approx([0.2, 0.4, 0.6, 0.8, 0.8, 0.4, 0.4, 0.4, 0.2, 0.2])
