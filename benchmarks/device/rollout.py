@@ -20,10 +20,10 @@ import vnca
 from vnca.bench.cases import PROBABILITY, Case, Place
 from vnca.bench.contenders import DTYPES
 from vnca.core.typing import Index
-from vnca.engine.reference.step import Weights
+from vnca.engine.automaton import Automaton, Weights
+from vnca.engine.backend import open_session
+from vnca.engine.session import Compute
 from vnca.engine.stencil import stencil
-from vnca.engine.triton import mask as triton_mask
-from vnca.engine.triton import step as triton
 
 COLUMNS = ("date", "device", "torch", "vnca", "what", "dtype", "grid", "occupancy", "ms", "peak_mb")
 
@@ -33,27 +33,22 @@ class Rollout:
 
     def __init__(self, case: Case, dtype: torch.dtype) -> None:
         place = Place("cuda", dtype)
-        self._hashes = torch.from_numpy(case.domain.hashes.view(np.int32)).cuda()
-        self._neighbours = torch.from_numpy(case.domain.neighbours).cuda()
-        self._priors = place.tensor(case.priors)
-        self._stencil = torch.from_numpy(stencil()).cuda()
         # So small that no state grows beyond what float16 holds.
         weights = (0.01 * torch.from_numpy(array).cuda() for array in case.weights)
         self.weights = Weights(*(weight.requires_grad_() for weight in weights))
+        self._session = open_session(
+            Automaton(self.weights, stencil(), PROBABILITY, seed=0),
+            case.domain,
+            place.tensor(case.priors),
+            Compute("triton", "cuda"),
+            differentiable=True,
+        )
         self.state = place.tensor(case.state)
         self.gradient = place.tensor(case.gradient)
 
     def after(self, steps: int) -> Tensor:
         """The state then."""
-        state = self.state
-        for step in range(steps):
-            rows = triton_mask.changing_rows(
-                self._hashes, seed=0, step=step, probability=PROBABILITY
-            )
-            state = triton.update(
-                state, rows, self._neighbours, self._priors, self.weights, self._stencil
-            )
-        return state
+        return self._session.run(self.state, range(steps))
 
     def frame(self) -> None:
         """What painting a frame computes."""

@@ -20,7 +20,6 @@ from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
 from vnca.painting.roll import Roll
 from vnca.rule.rule import Rule
-from vnca.rule.stepper import stepper
 from vnca.training.scenes.smoke import smoke_bounds
 
 PAPERS_GRID = 3.125
@@ -70,7 +69,7 @@ def training(study: Cost, seed: int) -> dict[str, float]:
 
 def painting(study: Cost, judge: Judge, rule: Rule, smoke: Volume) -> dict[str, float]:
     """Seconds of a frame, and how many cells it has."""
-    roll = Roll(rule, stepper(rule), PAINTED, smoke_bounds(smoke, rule.scales.density))
+    roll = Roll(rule, PAINTED, smoke_bounds(smoke, rule.scales.density))
     latest = roll.paint(smoke, roll.start())
     begun = time.perf_counter()
     for _ in range(study.repeats):

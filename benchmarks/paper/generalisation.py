@@ -21,7 +21,6 @@ from vnca.cli.sequence import open_sequence, sequence_region, volumes
 from vnca.cli.simulate import Simulate, write_simulation
 from vnca.painting.roll import Painting, stylize
 from vnca.rule.rule import Rule
-from vnca.rule.stepper import stepper
 from vnca.simulation.scenes import simulate
 
 RESOLUTION = 48
@@ -93,7 +92,7 @@ def painted(study: Generalisation, rule: Rule) -> Iterator[Painting]:
     sequence = open_sequence(str(study.sequence), study.frames)
     lattice, box = sequence_region(sequence, study.smoke)
     frames = volumes(sequence, study.smoke, lattice)
-    return stylize(frames, rule, stepper(rule), PAINTED, box=box)
+    return stylize(frames, rule, PAINTED, box=box)
 
 
 def judged(judge: Judge, painting: Painting, rule: Rule) -> dict[str, float]:

@@ -19,7 +19,6 @@ from vnca.painting.roll import Painting, Roll
 from vnca.rendering.colour import linear_to_srgb
 from vnca.rendering.view import Mode, View, render
 from vnca.rule.rule import Rule
-from vnca.rule.stepper import stepper
 from vnca.training.scenes.smoke import PORTRAIT_BACKGROUND, PORTRAIT_STEP, PORTRAITS, smoke_bounds
 
 Sight = tuple[float, float]
@@ -37,7 +36,7 @@ UNPAINTED = StylizeConfig(warmup=0, steps_per_frame=0, strength=0.0, density_str
 
 def paint(rule: Rule, smoke: Volume, config: StylizeConfig = PAINTED) -> Painting:
     """A frame as a rule paints it from nothing."""
-    roll = Roll(rule, stepper(rule), config, smoke_bounds(smoke, rule.scales.density))
+    roll = Roll(rule, config, smoke_bounds(smoke, rule.scales.density))
     return roll.paint(smoke, roll.start())
 
 

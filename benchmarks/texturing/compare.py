@@ -25,6 +25,7 @@ from solid import optimised_blocks
 from vnca.bench.machine import run_facts
 from vnca.bench.records import append_csv, write_json
 from vnca.core.typing import FloatArray
+from vnca.engine.session import Compute
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
 from vnca.io.picture import read_image
@@ -33,7 +34,6 @@ from vnca.metrics.slice_distance import slice_distances
 from vnca.painting.block import border_jump, grow
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule
-from vnca.rule.stepper import stepper
 from vnca.training.texture_config import PRESETS
 from vnca.training.texture_trainer import texture_trainer
 
@@ -98,9 +98,9 @@ def train(task: Task) -> tuple[Rule, dict[str, Any]]:
 def grown(task: Task, rule: Rule, size: int) -> dict[str, Any]:
     """A block of a trained rule, and how near its slices come."""
     style, network = task.begin()
-    step = stepper(rule, threads=task.threads)
     began = time.process_time()
-    block = next(grow(rule, step, size, steps=task.steps, seed=task.seed))
+    compute = Compute(threads=task.threads)
+    block = next(grow(rule, size, steps=task.steps, seed=task.seed, compute=compute))
     made = time.process_time() - began
     return {"make_s": round(made, 1), "peak_mb": peak_mb(), **judged(task, block, style, network)}
 

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from vnca.rendering.view import render as render_view
     from vnca.rule.model import Model
     from vnca.rule.rule import Rule, RuleConfig, Scales
-    from vnca.rule.stepper import stepper
     from vnca.simulation.scenes import simulate as simulate_smoke
     from vnca.training.loop import Trainer
     from vnca.training.smoke_config import PRESETS, TrainConfig
@@ -65,7 +64,6 @@ _HOMES = {
     "simulate_smoke": "simulation.scenes:simulate",
     "smoke_box": "io.smoke",
     "smoke_trainer": "training.smoke_trainer",
-    "stepper": "rule.stepper",
     "stylize_frames": "painting.roll:stylize",
     "write_image": "io.picture",
     "write_painted": "io.smoke",
@@ -102,7 +100,6 @@ __all__ = [
     "simulate_smoke",
     "smoke_box",
     "smoke_trainer",
-    "stepper",
     "stylize_frames",
     "write_image",
     "write_painted",

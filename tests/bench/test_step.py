@@ -15,6 +15,7 @@ from vnca.bench.step import (
     prepare,
 )
 from vnca.core.errors import BackendUnavailableError, DisagreementError, OptionError, VncaError
+from vnca.engine.native import BACKEND
 from vnca.engine.native import step as native
 from vnca.engine.reference import step as reference
 from vnca.engine.triton import step as triton
@@ -95,13 +96,7 @@ def test_nothing_is_timed_when_a_backend_computes_something_else(
     update: Callable[..., Tensor],
     complaint: str,
 ) -> None:
-    ours = contenders.torch_step
-    monkeypatch.setattr(contenders, "choose", lambda name, device: name)
-    monkeypatch.setattr(
-        contenders,
-        "torch_step",
-        lambda name, **options: update if name == "native" else ours(name, **options),
-    )
+    monkeypatch.setattr(type(BACKEND), "update", lambda self, **options: update)
     monkeypatch.setattr("vnca.bench.step.measure", pytest.fail)
     with pytest.raises(DisagreementError, match=complaint):
         rows_of(small(backends=("plain", "native")))

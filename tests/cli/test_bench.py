@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from vnca.bench import contenders
+from vnca.engine.native import BACKEND
 from vnca.engine.native import step as native
 from vnca.engine.reference import step as reference
 from vnca.engine.triton import step as triton
@@ -64,13 +65,7 @@ def test_no_speed_up_is_told_of_backends_that_disagree(
     def wrong(state: Tensor, *rest: Any) -> Tensor:
         return 1.01 * reference.update(state, *rest)
 
-    ours = contenders.torch_step
-    monkeypatch.setattr(contenders, "choose", lambda name, device: name)
-    monkeypatch.setattr(
-        contenders,
-        "torch_step",
-        lambda name, **options: wrong if name == "native" else ours(name, **options),
-    )
+    monkeypatch.setattr(type(BACKEND), "update", lambda self, **options: wrong)
     report, table = tmp_path / "run.json", tmp_path / "step.csv"
     kept = ("--json", report, "--csv", table)
     outcome = vnca(*STEP, "--backends", "plain,native", *kept)

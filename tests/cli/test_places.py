@@ -25,7 +25,6 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import stylize
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule, RuleConfig, Scales
-from vnca.rule.stepper import stepper
 from vnca.training.smoke_config import TrainConfig, ViewConfig
 from vnca.training.smoke_trainer import smoke_trainer
 
@@ -104,7 +103,7 @@ def paint(source: Path, form: SmokeFormat, target: Path) -> None:
     """A frame as a sequence, painted as `vnca stylize` does."""
     smoke = read_alone(source, form)
     config = StylizeConfig(warmup=6, steps_per_frame=2)
-    (painting,) = stylize([smoke], rule(), stepper(rule()), config, box=smoke.box)
+    (painting,) = stylize([smoke], rule(), config, box=smoke.box)
     lattice = Lattice(smoke.index_to_world)
     write_painted(
         target,

@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Callable
 from functools import partial
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,18 +12,19 @@ from torch import Tensor
 
 from vnca.core.errors import ShapeError
 from vnca.core.typing import AnyArray, FloatArray, IntArray
+from vnca.engine.automaton import Weights
 from vnca.engine.domain import Border, Domain
 from vnca.engine.mask import changing_rows
 from vnca.engine.native import step as native
 from vnca.engine.native.step_autograd import update as native_update
 from vnca.engine.reference import step as reference
-from vnca.engine.reference.step import Weights
+from vnca.engine.session import PRECISIONS
 from vnca.engine.stencil import stencil
 from vnca.engine.triton import step as triton_backend
 
 KERNELS: dict[str, dict[str, Any]] = {
     name: {"precision": precision, "instructions": name}
-    for precision in get_args(native.Precision)
+    for precision in PRECISIONS
     if native.unavailable(precision) is None
     for name in native.instructions(precision)
 }

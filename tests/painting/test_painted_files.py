@@ -12,6 +12,7 @@ from vnca.core.bricks.field import Field
 from vnca.core.lattice import Lattice
 from vnca.core.typing import Box
 from vnca.core.volume import Volume
+from vnca.engine.session import Compute
 from vnca.io.orientation import on_lattice
 from vnca.io.sequence import find_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, write_painted, write_smoke
@@ -20,14 +21,13 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import Painting, Roll
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule
-from vnca.rule.stepper import stepper
 
 KEPT = Path(__file__).parents[1] / "data" / "painting"
 PLAIN = SmokeFormat()
 
 
 def painted(frames: list[Path], rule: Rule, out: Path, box: Box) -> Iterator[Painting]:
-    roll = Roll(rule, stepper(rule, "reference"), StylizeConfig(warmup=4), box)
+    roll = Roll(rule, StylizeConfig(warmup=4), box, Compute("numpy"))
     state = roll.start()
     for path in frames:
         painting = roll.paint(read_smoke(path, PLAIN), state)

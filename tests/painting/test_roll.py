@@ -1,7 +1,10 @@
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +14,11 @@ from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError
 from vnca.core.typing import Box, FloatArray, IntArray
 from vnca.core.volume import Volume
+from vnca.engine.automaton import Automaton
+from vnca.engine.domain import Domain
 from vnca.engine.mask import changing_rows, hash_cells
+from vnca.engine.session import Compute, Job, Session, StepSession
+from vnca.painting import roll as roll_module
 from vnca.painting.ahead import read_ahead
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import Painting, Roll, stylize
@@ -22,7 +29,7 @@ BOX = Box((-10, -10, -10), (20, 20, 20))
 
 
 def counting_step(
-    state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
+    state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray, *_: object
 ) -> FloatArray:
     """A rule in which a cell counts in its red channel how often it changed, in hundredths."""
     assert neighbours.shape == (27, len(state) - 1)
@@ -30,6 +37,31 @@ def counting_step(
     state = state.copy()
     state[rows, 0] += 0.01
     return state
+
+
+@contextmanager
+def computed_by(step: Callable[..., FloatArray]) -> Iterator[None]:
+    """While the step of the native backend is another."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(roll_module, "open_session", partial(_session, step))
+        yield
+
+
+def _session(
+    step: Callable[..., FloatArray], automaton: Automaton, domain: Domain, told: Any, *_: object
+) -> Session:
+    job = Job(automaton, domain, told, Compute(), differentiable=False)
+    return StepSession.open(job, draw=_draw, update=step)
+
+
+def _draw(hashes: IntArray, **options: Any) -> IntArray:
+    return changing_rows(hashes.view(np.uint32), **options)
+
+
+@pytest.fixture(autouse=True)
+def counting() -> Iterator[None]:
+    with computed_by(counting_step):
+        yield
 
 
 def ball(frame: int, centre: tuple[int, int, int] = (0, 0, 0), origin: int = 0) -> Volume:
@@ -45,7 +77,7 @@ def nothing(frame: int) -> Volume:
 
 def rolled(frames: list[Volume], box: Box = BOX, **options: float | str) -> list[Painting]:
     config = StylizeConfig(**{"warmup": 6, "steps_per_frame": 2, **options})  # type: ignore[arg-type]
-    return list(stylize(frames, RULE, counting_step, config, box=box))
+    return list(stylize(frames, RULE, config, box=box))
 
 
 def at(painting: Painting, cell: tuple[int, int, int]) -> float:
@@ -104,7 +136,7 @@ def test_same_seed_same_painting_and_another_seed_another() -> None:
 def test_a_roll_goes_on_from_the_state_a_painting_left() -> None:
     frames = [ball(0), ball(1, (2, 0, 0)), nothing(2), ball(3)]
     whole = rolled(frames)
-    roll = Roll(RULE, counting_step, StylizeConfig(warmup=6, steps_per_frame=2), BOX)
+    roll = Roll(RULE, StylizeConfig(warmup=6, steps_per_frame=2), BOX)
     for before, after in pairwise(whole):
         again = roll.paint(after.smoke, before.state)
         np.testing.assert_array_equal(again.colour, after.colour)
@@ -120,7 +152,7 @@ def test_frames_are_read_one_at_a_time() -> None:
             yield ball(number)
 
     config = StylizeConfig(warmup=0, steps_per_frame=1)
-    paintings = stylize(frames(), RULE, counting_step, config, box=BOX)
+    paintings = stylize(frames(), RULE, config, box=BOX)
     next(paintings)
     assert read == [0]
 
@@ -149,16 +181,14 @@ def test_cells_live_as_far_from_the_smoke_as_the_rule_was_trained_with(reach: in
     config = dataclasses.replace(RULE.config, reach=reach)
     rule = dataclasses.replace(RULE, config=config)
     smoke = Volume(np.pad(ball(0).density, 4), None, (0, 0, 0), np.eye(4), 0)
-    (painting,) = stylize([smoke], rule, counting_step, StylizeConfig(), box=smoke.box)
+    (painting,) = stylize([smoke], rule, StylizeConfig(), box=smoke.box)
     lived = np.zeros(smoke.density.shape, bool)
     lived[tuple(painting.state.cells.T)] = True
     near = ndimage.maximum_filter(smoke.density > 0.5, 2 * reach + 1)
     np.testing.assert_array_equal(lived, near)
 
 
-def plain_step(
-    state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
-) -> FloatArray:
+def plain_step(state: FloatArray, *_: object) -> FloatArray:
     """A rule that paints all cells in one dark red."""
     state = state.copy()
     state[:-1, :3] = -0.1, -0.4, -0.5
@@ -170,8 +200,9 @@ def faint(fringe: int, **options: float) -> Painting:
     density = np.maximum(np.pad(ball(0).density, 6), np.float32(1e-4))
     smoke = Volume(density, None, (0, 0, 0), np.eye(4), 0)
     config = StylizeConfig(warmup=1, **options)  # type: ignore[arg-type]
-    roll = Roll(RULE, plain_step, config, smoke.box, fringe=fringe)
-    return roll.paint(smoke, roll.start())
+    roll = Roll(RULE, config, smoke.box, fringe=fringe)
+    with computed_by(plain_step):
+        return roll.paint(smoke, roll.start())
 
 
 def test_faint_smoke_has_the_colour_of_the_painting_beside_it_and_is_white_farther_away() -> None:
@@ -221,5 +252,5 @@ def test_cells_live_where_they_did_in_training_unless_asked_otherwise() -> None:
         *((RULE, None, "active"), (RULE, "box", "box")),
         *((boxed, None, "box"), (boxed, "active", "active")),
     ):
-        roll = Roll(rule, counting_step, StylizeConfig(domain=asked), BOX)  # type: ignore[arg-type]
+        roll = Roll(rule, StylizeConfig(domain=asked), BOX)  # type: ignore[arg-type]
         assert roll.domain_kind == kind

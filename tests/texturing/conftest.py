@@ -10,7 +10,6 @@ from vnca.core.typing import FloatArray
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig
 from vnca.rule.rule import Rule, RuleConfig
-from vnca.rule.stepper import Step, stepper
 from vnca.training.texture_config import SliceConfig, TextureConfig
 from vnca.training.texture_trainer import initial_rule
 
@@ -51,8 +50,3 @@ def rule(tiny_config: TextureConfig) -> Rule:
     rule = initial_rule(tiny_config)
     output = np.random.default_rng(2).normal(0, 0.2, rule.output.shape).astype(np.float32)
     return replace(rule, output=output)
-
-
-@pytest.fixture(scope="session")
-def step(rule: Rule) -> Step:
-    return stepper(rule)

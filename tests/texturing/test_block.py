@@ -7,14 +7,14 @@ from scipy.ndimage import map_coordinates
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
+from vnca.engine.backend import open_session
 from vnca.painting.block import block_domain, border_jump, grow, sample_block
 from vnca.rule.rule import Rule
-from vnca.rule.stepper import Step
 
 
 @pytest.fixture(scope="module")
-def block(rule: Rule, step: Step) -> FloatArray:
-    return next(grow(rule, step, 16, steps=12, seed=5))
+def block(rule: Rule) -> FloatArray:
+    return next(grow(rule, 16, steps=12, seed=5))
 
 
 def test_a_block_holds_colours_that_can_be_shown(block: FloatArray) -> None:
@@ -31,36 +31,36 @@ def test_the_block_tiles_without_a_jump_at_its_border(block: FloatArray) -> None
     assert border_jump(cut) > 1.2
 
 
-def test_the_automaton_does_not_know_where_the_border_is(rule: Rule, step: Step) -> None:
+def test_the_automaton_does_not_know_where_the_border_is(rule: Rule) -> None:
     """With all cells changing in every step, a shifted beginning gives a shifted block."""
     always = replace(rule.config, update_probability=1.0)
     domain = block_domain(8)
     random = np.random.default_rng(0)
     dense = random.normal(0, 0.2, (8, 8, 8, always.channels)).astype(np.float32)
 
+    automaton = replace(rule, config=always).automaton(seed=0)
+    session = open_session(automaton, domain, np.zeros((len(domain), 7), np.float32))
+
     def rolled(start: FloatArray) -> FloatArray:
         state = np.append(start[tuple(domain.cells.T)], np.zeros((1, always.channels), "f"), 0)
-        rows = np.arange(len(domain), dtype=np.int32)
-        for _ in range(4):
-            state = step(state, rows, domain.neighbours, np.zeros((len(domain), 7), np.float32))
-        return domain.scatter(state[:-1], domain.box)
+        return domain.scatter(session.run(state, range(4))[:-1], domain.box)
 
     shifted = rolled(np.roll(dense, (3, 5, 1), (0, 1, 2)))
     np.testing.assert_allclose(shifted, np.roll(rolled(dense), (3, 5, 1), (0, 1, 2)), atol=1e-5)
 
 
-def test_same_seed_same_block_and_another_seed_another(rule: Rule, step: Step) -> None:
-    one, two, other = (next(grow(rule, step, 8, steps=6, seed=s)) for s in (1, 1, 2))
+def test_same_seed_same_block_and_another_seed_another(rule: Rule) -> None:
+    one, two, other = (next(grow(rule, 8, steps=6, seed=s)) for s in (1, 1, 2))
     np.testing.assert_array_equal(one, two)
     assert not np.array_equal(one, other)
 
 
-def test_a_block_lives_on_in_even_steps(rule: Rule, step: Step) -> None:
-    first, second, third = islice(grow(rule, step, 8, steps=4, pause=3), 3)
+def test_a_block_lives_on_in_even_steps(rule: Rule) -> None:
+    first, second, third = islice(grow(rule, 8, steps=4, pause=3), 3)
     assert not np.array_equal(first, second)
-    np.testing.assert_array_equal(second, next(grow(rule, step, 8, steps=7)))
-    np.testing.assert_array_equal(third, next(grow(rule, step, 8, steps=10)))
-    still, same = islice(grow(rule, step, 8, steps=4), 2)
+    np.testing.assert_array_equal(second, next(grow(rule, 8, steps=7)))
+    np.testing.assert_array_equal(third, next(grow(rule, 8, steps=10)))
+    still, same = islice(grow(rule, 8, steps=4), 2)
     np.testing.assert_array_equal(still, same)
 
 
@@ -75,6 +75,6 @@ def test_sampling_agrees_with_scipy_also_far_outside(block: FloatArray) -> None:
 
 
 @pytest.mark.parametrize("size", [0, 7, 10**6])
-def test_blocks_that_cannot_be_grown_are_refused(rule: Rule, step: Step, size: int) -> None:
+def test_blocks_that_cannot_be_grown_are_refused(rule: Rule, size: int) -> None:
     with pytest.raises(OptionError, match="expected from"):
-        next(grow(rule, step, size, steps=1))
+        next(grow(rule, size, steps=1))

@@ -28,7 +28,7 @@ def seen(
 def test_cells_are_told_nothing_and_see_across_the_border() -> None:
     scene = BlockScene(8, SliceConfig(size=32, count=1))
     assert not scene.priors.any()
-    assert (scene.neighbours < len(scene.domain)).all()
+    assert (scene.domain.neighbours < len(scene.domain)).all()
 
 
 def test_the_block_is_the_state_in_its_place() -> None:

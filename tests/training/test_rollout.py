@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from vnca.engine.backend import torch_step
+from vnca.engine.automaton import Weights
+from vnca.engine.backend import backend_named
 from vnca.engine.domain import Domain
 from vnca.engine.mask import changing_rows
-from vnca.engine.reference.step import Weights
 from vnca.engine.stencil import stencil
 from vnca.training.rollout import fewest_kept, layout, roll_out
 
@@ -53,7 +53,7 @@ def automaton() -> Callable[[str], tuple[Callable[[Tensor, int], Tensor], Tensor
         weights = Weights(*(drawn(*s).requires_grad_() for s in ((16, 37), (16,), (6, 16))))
         state = drawn(len(domain) + 1, 6)
         state[-1] = 0
-        step = torch_step(backend)
+        step = backend_named(backend).update()
         around = torch.from_numpy(domain.neighbours), drawn(len(domain), 7)
         filters = torch.from_numpy(stencil())
 

@@ -10,9 +10,9 @@ from torch import Tensor
 from vnca.bench.cases import CHANNELS, Case, Place
 from vnca.bench.plain import Grid, depthwise, input_order, plain_step
 from vnca.core.errors import BackendUnavailableError, OptionError
-from vnca.engine.backend import choose, torch_step
-from vnca.engine.native import step as native
-from vnca.engine.reference.step import Weights
+from vnca.engine.automaton import Weights
+from vnca.engine.backend import backend_named, choose
+from vnca.engine.session import Compute
 from vnca.engine.stencil import stencil
 from vnca.rule.rule import PRIORS
 
@@ -98,14 +98,14 @@ def _why_not(name: str, dtype: str, device: str) -> str | None:
     if name == "compile":
         return _why_not_compiled(device)
     try:
-        choose(name, device=device)
+        backend = choose(Compute(name, device), differentiable=True)
     except BackendUnavailableError as error:
         return str(error)
     if name != "native" or dtype == "float32":
         return None
     if dtype != "bfloat16":
         return f"the native kernel computes in float32 or bfloat16, not in {dtype}"
-    return native.unavailable("bfloat16")
+    return backend.unavailable(Compute(name, precision=dtype))
 
 
 @cache
@@ -158,7 +158,7 @@ def _packaged(case: Case, name: str, place: Place, *, threads: int) -> Contender
     if name == "native" and place.dtype == torch.bfloat16:
         # It rounds the factors of its products itself; states and sums stay float32.
         precision, place = "bfloat16", Place(place.device, torch.float32)
-    update = torch_step(name, device=place.device, threads=threads, precision=precision)
+    update = backend_named(name).update(threads=threads, precision=precision)
     rows, neighbours = (
         torch.from_numpy(array).to(place.device) for array in (case.rows, case.domain.neighbours)
     )

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from vnca.engine.automaton import Weights
 from vnca.engine.domain import Domain
-from vnca.engine.reference.step import Weights
 from vnca.engine.stencil import FILTERS
 
 

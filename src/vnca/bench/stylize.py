@@ -19,7 +19,7 @@ from vnca.core.lattice import Lattice
 from vnca.core.typing import Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.backend import choose
-from vnca.engine.native.step import Precision
+from vnca.engine.session import Compute
 from vnca.io.orientation import on_one_lattice
 from vnca.io.sequence import FrameSequence, find_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
@@ -27,11 +27,10 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import Painter
 from vnca.painting.roll import Roll
 from vnca.rule.rule import Rule, RuleConfig, Scales
-from vnca.rule.stepper import stepper
 from vnca.simulation.scenes import simulate
 
-BACKENDS = ("native", "reference")
-TOLERANCES: dict[Precision, float] = {"float32": 1e-3, "bfloat16": 5e-2}
+BACKENDS = ("native", "numpy", "reference")
+TOLERANCES: dict[str, float] = {"float32": 1e-3, "bfloat16": 5e-2}
 """Of the state after the first frame: norm of the difference from the first backend over the norm.
 A trained rule multiplies what rounding does in tens of steps."""
 _LATEST = 3
@@ -75,11 +74,11 @@ class PaintedSequence:
         """That of the frames."""
         return Lattice(self.volumes[-1].index_to_world)
 
-    def roll(self, backend: str, threads: int, precision: Precision) -> Roll:
+    def roll(self, backend: str, threads: int, precision: str) -> Roll:
         """The rule in a backend, ready for the sequence."""
         box = reduce(Box.union, (volume.box for volume in self.volumes))
-        step = stepper(self.rule, backend, threads=threads, precision=precision)
-        return Roll(self.rule, step, self.config, box)
+        compute = Compute(backend, precision=precision, threads=threads)
+        return Roll(self.rule, self.config, box, compute)
 
 
 def random_rule(hidden: int, seed: int = 0) -> Rule:
@@ -106,7 +105,7 @@ def available() -> tuple[str, ...]:
 
     def runs(name: str) -> bool:
         try:
-            return choose(name) == name
+            return choose(Compute(name)).name == name
         except BackendUnavailableError:
             return False
 
@@ -119,7 +118,7 @@ def measure_stylizing(
     *,
     threads: int,
     repeats: int,
-    precision: Precision = "float32",
+    precision: str = "float32",
 ) -> list[dict[str, Any]]:
     """A row for each backend, computing only and with files: seconds a frame.
 
@@ -134,9 +133,7 @@ def measure_stylizing(
         BackendUnavailableError: If a backend cannot run here.
         DisagreementError: If backends do not paint the same; then nothing is timed.
     """
-    types: dict[str, Precision] = {
-        name: precision if name == "native" else "float32" for name in backends
-    }
+    types = {name: precision if name == "native" else "float32" for name in backends}
     rolls = {name: painted.roll(name, threads, dtype) for name, dtype in types.items()}
     first = {name: roll.paint(painted.volumes[0], roll.start()) for name, roll in rolls.items()}
     states = {name: painting.state.values for name, painting in first.items()}

@@ -19,6 +19,7 @@ from vnca.bench.plain import PlainUpdate
 from vnca.bench.timing import Spread
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
+from vnca.engine.session import StepSession
 from vnca.features.network import FeatureNetwork
 from vnca.training.loop import Trainer
 from vnca.training.smoke_config import TrainConfig
@@ -75,7 +76,9 @@ class Training:
         )
         if backend in PLAIN:
             compiled = backend == "compile"
-            trainer.step = PlainUpdate(trainer.scene.domain, self.device, compiled=compiled)
+            update = PlainUpdate(trainer.scene.domain, self.device, compiled=compiled)
+            assert isinstance(trainer.session, StepSession)
+            trainer.session = replace(trainer.session, update=update)
         return trainer
 
 

@@ -21,8 +21,9 @@ from vnca.cli.bench_options import Rows, Tables, parse_bench, short
 from vnca.cli.options import say
 from vnca.cli.sequence import open_sequence
 from vnca.core.errors import OptionError
-from vnca.engine.backend import array_step
-from vnca.engine.native.step import Precision, default_threads
+from vnca.engine.backend import choose
+from vnca.engine.native.step import default_threads
+from vnca.engine.session import Compute
 from vnca.io.smoke import SmokeFormat, with_fitted_scale
 from vnca.rule.model import Model
 
@@ -50,8 +51,8 @@ class BenchStylize(Tables):
     steps_per_frame: int | None = None
     """Steps of the automaton in each frame; the rule's own unless given."""
     backends: tuple[str, ...] = ()
-    """Of native and reference; all that can run here unless given."""
-    precision: Precision = "float32"
+    """Of native, numpy and reference; all that can run here unless given."""
+    precision: str = "float32"
     """What the native kernel rounds the factors of its products to."""
     threads: int = default_threads()
     """Of the native kernel; as many as there are cores unless given."""
@@ -88,7 +89,7 @@ def bench_stylize(options: BenchStylize) -> None:
     options.require_writable()
     backends = options.backends or available()
     for name in backends:  # what cannot run is refused before smoke is simulated
-        array_step(name, precision=options.precision if name == "native" else "float32")
+        choose(Compute(name, precision=options.precision if name == "native" else "float32"))
     facts = run_facts("cpu", options.threads)
     with tempfile.TemporaryDirectory() as folder:
         rows = measure_stylizing(

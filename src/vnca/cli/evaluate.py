@@ -19,6 +19,7 @@ from vnca.cli.sequence import open_sequence, placed, sequence_region, volumes
 from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import whole_file, writable_folder
 from vnca.core.typing import FloatArray
+from vnca.engine.session import Compute
 from vnca.features.load import load_network
 from vnca.io.picture import read_image
 from vnca.io.sequence import format_frames
@@ -33,7 +34,6 @@ from vnca.metrics.survey import survey
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import stylize
 from vnca.rule.model import Model
-from vnca.rule.stepper import stepper
 from vnca.training.run import CONFIG_NAME
 
 REPORT_NAME = "report.html"
@@ -69,7 +69,7 @@ class Evaluate:
     """Paint on a grid so many times as fine as that of the smoke."""
     size: int = SIZE
     """Rows and columns of the views, pixels."""
-    backend: Literal["auto", "native", "reference"] = "auto"
+    backend: str = "auto"
     """What computes the automaton."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
@@ -122,10 +122,10 @@ def evaluate(options: Evaluate, model: Model) -> None:
     paintings = stylize(
         volumes(sequence, smoke, lattice),
         rule,
-        stepper(rule, options.backend),
         options.config,
         box=box,
         refine=refine,
+        compute=Compute(options.backend),
     )
     tracking = tracked(paintings, "painting and measuring", len(sequence), "frames")
     judges = _judges(model, gauge, options.size)

@@ -29,7 +29,7 @@ from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import remove_leftovers, writable_file, writable_folder
 from vnca.core.volume import refined_transform
 from vnca.engine.backend import choose
-from vnca.engine.native.step import Precision
+from vnca.engine.session import Compute
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.painted import read_colour
 from vnca.io.provenance import read_provenance
@@ -40,7 +40,6 @@ from vnca.painting.painter import OnError, Painter
 from vnca.painting.roll import Roll
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule
-from vnca.rule.stepper import stepper
 
 
 @dataclass(frozen=True)
@@ -66,9 +65,9 @@ class Stylize:
     brightness without training again. It is told in the files."""
     density_scale: float | None = None
     """Density that counts as 1; that of the training frame unless given."""
-    backend: Literal["auto", "native", "reference"] = "auto"
+    backend: str = "auto"
     """What computes the automaton."""
-    precision: Precision = "float32"
+    precision: str = "float32"
     """What the native kernel rounds the factors of its products to; bfloat16 is quicker where the
     processor has it."""
     resume: bool = False
@@ -140,13 +139,9 @@ def paint(options: Stylize, model: Model | None = None) -> None:
     region = sequence_region(sequence, smoke, without_broken=options.on_error != "stop")
     require_dense_enough(sequence, smoke, scales.density)
     rule = placed(rule, region)
-    backend = choose(options.backend)
-    roll = Roll(
-        rule,
-        stepper(rule, backend, precision=options.precision),
-        options.config,
-        region.box,
-    ).refined(options.refine)
+    compute = Compute(options.backend, precision=options.precision)
+    backend = choose(compute).name
+    roll = Roll(rule, options.config, region.box, compute).refined(options.refine)
     facts = _facts(options, model, roll)
     painter = Painter(
         sequence,

@@ -1,18 +1,18 @@
 """Growing a block of solid texture, as the subcommands of `vnca texture` do."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from vnca.cli.options import say
 from vnca.cli.progress import Progress
 from vnca.core.errors import OptionError
-from vnca.core.typing import FloatArray, IntArray
+from vnca.core.typing import FloatArray
+from vnca.engine.session import Compute
 from vnca.painting.block import LARGEST, SMALLEST, grow
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule
-from vnca.rule.stepper import Step, stepper
 
 KIND = "texture"
 """What the model of a solid texture says it is, under `kind` in its record of training."""
@@ -30,7 +30,7 @@ class BlockConfig:
     """Steps between two pictures of a living texture; the rule's own pace unless given."""
     seed: int = 0
     """Same seed, same machine, same block."""
-    backend: Literal["auto", "native", "reference"] = "auto"
+    backend: str = "auto"
     """What computes the automaton."""
 
     def __post_init__(self) -> None:
@@ -65,22 +65,15 @@ def grown_blocks(rule: Rule, config: BlockConfig, count: int = 1) -> Iterator[Fl
         pause = rule.config.steps_per_frame
     total = config.steps + (count - 1) * pause
     with Progress(f"growing {config.block}³ cells,", total, "steps") as progress:
-        step = _counted(stepper(rule, config.backend), progress)
-        blocks = grow(rule, step, config.block, steps=config.steps, seed=config.seed, pause=pause)
+        steps = itertools.count(1)
+        blocks = grow(
+            rule,
+            config.block,
+            steps=config.steps,
+            seed=config.seed,
+            pause=pause,
+            compute=Compute(config.backend),
+            watch=lambda: progress.show(next(steps)),
+        )
         for _ in range(count):
             yield next(blocks)
-
-
-def _counted(step: Step, progress: Progress) -> Step:
-    done = 0
-
-    def counted(
-        state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
-    ) -> FloatArray:
-        nonlocal done
-        state = step(state, rows, neighbours, priors)
-        done += 1
-        progress.show(done)
-        return state
-
-    return counted

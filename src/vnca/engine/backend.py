@@ -1,139 +1,130 @@
-"""Which implementation of a step runs: the fastest that is there, or the one asked for by name."""
+"""Where an automaton is computed: what a backend is, which there are, and a session on one.
 
-import importlib.util
+A backend is one folder beside this file, whose `BACKEND` is registered in `BACKENDS`. It offers
+sessions: a session holds state, neighbours, conditioning and mask where they are computed.
+"""
+
 import sys
-from collections.abc import Callable
-from functools import cache, partial
-from typing import Any, Literal
+from abc import ABC, abstractmethod
+from functools import cache
+from importlib import import_module
+from typing import Any
 
 from vnca.core.errors import BackendUnavailableError, OptionError
-from vnca.core.typing import FloatArray
-from vnca.engine.native import step as native
-from vnca.engine.native.step import Precision
+from vnca.engine.automaton import Automaton
+from vnca.engine.domain import Domain
+from vnca.engine.session import Compute, Job, Session
 
-Backend = Literal["native", "triton", "reference"]
+BACKENDS = ("native", "triton", "numpy", "reference")
+"""Names of backends, each that of its folder, the fastest on its kind of device first."""
 
 
-def choose(backend: str = "auto", *, device: str = "cpu") -> Backend:
+class Backend(ABC):
+    """One way to compute steps.
+
+    Attributes:
+        name: As a user asks for it.
+        precisions: Those it can round the factors of its products to.
+        has_gradients: Whether its sessions can be differentiable.
+    """
+
+    name: str
+    precisions: tuple[str, ...] = ("float32",)
+    has_gradients = True
+
+    def unavailable(self, compute: Compute, *, differentiable: bool = False) -> str | None:
+        """Why it cannot compute so here, or nothing if it can."""
+        if differentiable and not self.has_gradients:
+            return "it has no gradients; use reference"
+        if compute.precision not in self.precisions:
+            return f"only the native backend has {compute.precision}; use precision float32"
+        return self.missing(compute)
+
+    @abstractmethod
+    def missing(self, compute: Compute) -> str | None:
+        """What it lacks here, or nothing: a device, a compiler, a package."""
+
+    @abstractmethod
+    def session(self, job: Job) -> Session:
+        """A session; only called where the backend is available."""
+
+    def update(self, *, threads: int | None = None, precision: str = "float32") -> Any:
+        """The bare differentiable step on tensors, called as that of the reference is.
+
+        For its sessions, and for comparisons of backends.
+
+        Raises:
+            BackendUnavailableError: If the backend has none.
+        """
+        del threads, precision
+        raise BackendUnavailableError(f"backend {self.name} has no step on tensors")
+
+
+def backend_named(name: str) -> Backend:
+    """A registered backend.
+
+    Raises:
+        OptionError: If there is none of that name.
+    """
+    if name not in BACKENDS:
+        raise OptionError(f"`backend` {name}: expected auto, {', '.join(BACKENDS)}")
+    return import_module(f"vnca.engine.{name}").BACKEND
+
+
+def choose(compute: Compute, *, differentiable: bool = False) -> Backend:
     """The backend to run.
 
     `auto` says once on stderr what it takes if that is no fast one, or if it computes on a GPU.
 
-    Args:
-        backend: `auto`, `native`, `triton` or `reference`.
-        device: Kind of device that holds the state, as torch names it.
-
-    Raises:
-        BackendUnavailableError: If the backend asked for cannot run here.
-        OptionError: If there is no backend of that name.
-    """
-    if backend == "auto":
-        fast: Backend = "native" if device == "cpu" else "triton"
-        why_slow = _UNAVAILABLE[fast](device)
-        if why_slow is None:
-            if device != "cpu":
-                _say_once(f"vnca: running the {fast} step on {device}")
-            return fast
-        _say_once(f"vnca: running the slow reference step: {why_slow}")
-        return "reference"
-    for name, unavailable in _UNAVAILABLE.items():
-        if backend == name:
-            reason = unavailable(device)
-            if reason is not None:
-                raise BackendUnavailableError(f"backend {backend} cannot run: {reason}")
-            return name
-    raise OptionError(f"backend: expected auto, {', '.join(_UNAVAILABLE)}, got {backend}")
-
-
-def torch_step(
-    backend: str = "auto",
-    *,
-    device: str = "cpu",
-    threads: int | None = None,
-    precision: Precision = "float32",
-) -> Callable[..., Any]:
-    """The differentiable step on tensors, called as `vnca.engine.reference.step.update` is.
-
-    Args:
-        backend: As in `choose`.
-        device: As in `choose`.
-        threads: How many the native kernel uses; the reference uses as many as torch does.
-        precision: What the native kernel rounds the factors of its products to. The others have
-            only float32: they compute in the type of the state that they are given.
-
     Raises:
         BackendUnavailableError: If the backend asked for cannot run here, or not so.
-        OptionError: If there is no backend or precision of that name.
     """
-    chosen = choose(backend, device=device)
-    _check(precision, chosen)
-    if chosen == "native":
-        from vnca.engine.native.step_autograd import update
-
-        return partial(update, threads=threads, precision=precision)
-    if chosen == "triton":
-        from vnca.engine.triton.step import update
-
-        return update
-    from vnca.engine.reference.step import update
-
-    return update
-
-
-def array_step(
-    backend: str = "auto", *, threads: int | None = None, precision: Precision = "float32"
-) -> Callable[..., FloatArray]:
-    """The step on arrays, called as `vnca.engine.native.step.forward` is, up to `stencil`.
-
-    None of them uses torch: the reference on arrays is written in numpy, and uses as many threads
-    as that does. Triton works on tensors that stay on the GPU, not on arrays. Arguments and errors
-    are those of `torch_step`.
-    """
-    if backend == "triton":
+    if compute.backend != "auto":
+        backend = backend_named(compute.backend)
+        reason = backend.unavailable(compute, differentiable=differentiable)
+        if reason is not None:
+            raise BackendUnavailableError(f"backend {backend.name} cannot run: {reason}")
+        return backend
+    on_cpu = compute.device_type == "cpu"
+    fast = backend_named("native" if on_cpu else "triton")
+    reason = fast.unavailable(compute, differentiable=differentiable)
+    if reason is None:
+        if not on_cpu:
+            _say_once(f"vnca: running the {fast.name} step on {compute.device_type}")
+        return fast
+    slow = backend_named("numpy" if on_cpu and not differentiable else "reference")
+    problem = slow.unavailable(compute, differentiable=differentiable)
+    if problem is not None:
         raise BackendUnavailableError(
-            "backend triton cannot run: it works on tensors on a GPU, not on arrays in main "
-            "memory; expected auto, native or reference"
+            f"no backend can run: {fast.name}: {reason}; {slow.name}: {problem}"
         )
-    chosen = choose(backend)
-    _check(precision, chosen)
-    if chosen == "native":
-        return partial(native.forward, threads=threads, precision=precision)
-    from vnca.engine.numpy.step import update
-
-    return update
+    _say_once(f"vnca: running the slow {slow.name} step: {reason}")
+    return slow
 
 
-def _check(precision: Precision, chosen: Backend) -> None:
-    reason = native.unavailable(precision)
-    if precision == "float32":
-        return
-    if chosen != "native":
-        reason = "only the native kernel has it; use precision float32"
-    if reason is not None:
-        raise BackendUnavailableError(f"backend {chosen} cannot run with {precision}: {reason}")
+def open_session(
+    automaton: Automaton,
+    domain: Domain,
+    conditioning: Any,
+    compute: Compute | None = None,
+    *,
+    differentiable: bool = False,
+) -> Session:
+    """An automaton on a domain, ready to run.
 
+    Args:
+        automaton: Weights, filters and mask.
+        domain: The active cells.
+        conditioning: `[n, P]` of the cells, an array or, for a differentiable session, a tensor.
+        compute: How to compute; the fastest way on the CPU unless given.
+        differentiable: Whether states are tensors through which gradients flow.
 
-def _native_unavailable(device: str) -> str | None:
-    if device != "cpu":
-        return f"the native kernel works on the CPU, not on {device}"
-    return native.unavailable()
-
-
-def _triton_unavailable(device: str) -> str | None:
-    if importlib.util.find_spec("torch") is None:
-        return "it needs torch; install vnca[train]"
-    from vnca.engine.triton.step import unavailable
-
-    return unavailable(device)
-
-
-_UNAVAILABLE: dict[Backend, Callable[[str], str | None]] = {
-    "native": _native_unavailable,
-    "triton": _triton_unavailable,
-    "reference": lambda device: None,
-}
-"""Why a backend cannot run on a kind of device, or nothing; asked only of those that are needed:
-some answers take importing torch."""
+    Raises:
+        BackendUnavailableError: If what was asked for cannot run here.
+    """
+    compute = compute or Compute()
+    backend = choose(compute, differentiable=differentiable)
+    return backend.session(Job(automaton, domain, conditioning, compute, differentiable))
 
 
 @cache

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from vnca.core.errors import BackendUnavailableError
 from vnca.core.typing import FloatArray
 from vnca.engine.backend import choose
+from vnca.engine.session import Compute
 
 
 def torch_decode(
@@ -23,7 +24,7 @@ def torch_decode(
         BackendUnavailableError: If the backend asked for cannot run here.
         OptionError: If there is no backend of that name.
     """
-    chosen = choose(backend, device=device)
+    chosen = choose(Compute(backend, device), differentiable=True).name
     if chosen == "native":
         from vnca.engine.native.decode_autograd import decode
 
@@ -52,14 +53,14 @@ class ArrayDecode(NamedTuple):
 def array_decode(backend: str = "auto", *, threads: int | None = None) -> ArrayDecode:
     """Decoding of arrays, which takes no torch; arguments and errors are those of `torch_decode`.
 
-    Triton works on tensors that stay on the GPU, not on arrays.
+    Triton and the reference work on tensors, not on arrays.
     """
-    if backend == "triton":
+    if backend in ("triton", "reference"):
         raise BackendUnavailableError(
-            "backend triton cannot run: it works on tensors on a GPU, not on arrays in main "
-            "memory; expected auto, native or reference"
+            f"backend {backend} cannot run: it works on tensors, not on arrays in main memory; "
+            "expected auto, native or numpy"
         )
-    if choose(backend) == "native":
+    if choose(Compute(backend)).name == "native":
         from vnca.engine.native import decode as native
 
         return ArrayDecode(

@@ -9,13 +9,13 @@ import numpy as np
 from vnca.core.errors import GridError
 from vnca.core.typing import Box, FloatArray
 from vnca.core.volume import Volume
+from vnca.engine.session import Compute
 from vnca.io.orientation import on_one_lattice
 from vnca.metrics.stage import SIZE, Coloured, Pair, Sight, Stage
 from vnca.metrics.style import StyleDistances, StyleGauge, gap_closed, mean_distances
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import stylize
 from vnca.rule.rule import Rule
-from vnca.rule.stepper import stepper
 
 FEWEST_OPAQUE = 64
 """Opaque pixels without which a view says nothing about style."""
@@ -124,7 +124,7 @@ def measure_style(
     size: int = SIZE,
     every: int = 6,
     config: StylizeConfig | None = None,
-    backend: str = "auto",
+    compute: Compute | None = None,
 ) -> Likeness:
     """Paint a sequence and compare four sides of some of its frames with the style picture.
 
@@ -137,7 +137,7 @@ def measure_style(
         size: Rows and columns of the views.
         every: So many frames are painted for one that is looked at; the last one is.
         config: How the rule is applied.
-        backend: What computes the automaton.
+        compute: How steps are computed.
 
     Raises:
         GridError: If there is no smoke, or none that is opaque.
@@ -146,8 +146,8 @@ def measure_style(
     box = reduce(Box.union, (smoke.box for smoke in frames), Box((0, 0, 0), (0, 0, 0)))
     stage = Stage.around(frames, rule, size).refined(refine)
     gauge = StyleGauge(picture, round(cells * stage.scale))
-    step, config = stepper(rule, backend), config or StylizeConfig()
-    paintings = stylize(frames, rule, step, config, box=box, refine=refine)
+    config = config or StylizeConfig()
+    paintings = stylize(frames, rule, config, box=box, refine=refine, compute=compute)
     parts = []
     for at, painting in enumerate(paintings, 1):
         if (len(frames) - at) % every == 0:

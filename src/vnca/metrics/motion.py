@@ -16,6 +16,7 @@ from torch import Tensor
 from vnca.core.errors import GridError
 from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.volume import Volume
+from vnca.engine.session import Compute
 from vnca.losses.motion import MotionConfig, compare_motion, supervised
 from vnca.losses.pixels import luminance
 from vnca.metrics.estimators import Estimator
@@ -24,7 +25,6 @@ from vnca.painting.roll import Roll
 from vnca.rendering.colour import linear_to_srgb
 from vnca.rendering.sample import sample
 from vnca.rule.rule import COLOUR, Rule
-from vnca.rule.stepper import stepper
 from vnca.training.scenes.smoke import SmokeScene, SmokeSight
 from vnca.training.smoke_config import ViewConfig
 
@@ -78,7 +78,7 @@ def measure_motion(
     frames: int = 3,
     warmup: int = 64,
     seed: int = 0,
-    backend: str = "auto",
+    compute: Compute | None = None,
 ) -> MotionMeasures:
     """Let a rule paint one frame of smoke for some time and see how its texture moves.
 
@@ -90,7 +90,7 @@ def measure_motion(
         frames: How many times a frame's steps are made and looked at.
         warmup: Steps before all that.
         seed: Of the update masks.
-        backend: What computes the automaton.
+        compute: How steps are computed.
 
     Raises:
         GridError: If there is no smoke in the frame, it has no velocity, or nothing in it moves.
@@ -99,7 +99,7 @@ def measure_motion(
     """
     scene = _moving_scene(rule, smoke, size)
     config = StylizeConfig(warmup=warmup, seed=seed)
-    states = list(_states(rule, smoke, scene.box, config, frames + 1, backend))
+    states = list(_states(rule, smoke, scene.box, config, frames + 1, compute))
     return _measure(scene, smoke, states, estimators)
 
 
@@ -233,10 +233,15 @@ def transport_ratio(
 
 
 def _states(
-    rule: Rule, smoke: Volume, box: Box, config: StylizeConfig, count: int, backend: str
+    rule: Rule,
+    smoke: Volume,
+    box: Box,
+    config: StylizeConfig,
+    count: int,
+    compute: Compute | None,
 ) -> Iterator[FloatArray]:
     """States a frame's steps apart, on density that stays as it is."""
-    roll = Roll(rule, stepper(rule, backend), config, box)
+    roll = Roll(rule, config, box, compute or Compute())
     state = roll.start()
     for _ in range(count):
         state = roll.paint(smoke, state).state

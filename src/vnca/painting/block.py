@@ -1,16 +1,16 @@
 """The block of solid texture that a rule grows; it tiles space."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import AnyArray, FloatArray
+from vnca.engine.backend import open_session
 from vnca.engine.domain import Domain
-from vnca.engine.mask import changing_rows
+from vnca.engine.session import Compute
 from vnca.rule.paint import colours
 from vnca.rule.rule import PRIORS, Rule
-from vnca.rule.stepper import Step
 
 SMALLEST, LARGEST = 8, 384
 """Cells along an edge."""
@@ -28,32 +28,37 @@ def block_domain(size: int) -> Domain:
 
 
 def grow(
-    rule: Rule, step: Step, size: int, *, steps: int, seed: int = 0, pause: int = 0
+    rule: Rule,
+    size: int,
+    *,
+    steps: int,
+    seed: int = 0,
+    pause: int = 0,
+    compute: Compute | None = None,
+    watch: Callable[[], None] | None = None,
 ) -> Iterator[FloatArray]:
     """Grow a block from nothing, and let it live on: one block after the other, without end.
 
     Args:
         rule: Cells are told nothing but their neighbourhood: its priors are zero here.
-        step: The kernel that applies it.
         size: Cells along an edge.
         steps: Steps before the first block.
         seed: Same seed, same machine, same block.
         pause: Steps between two blocks.
+        compute: How steps are computed.
+        watch: Is called after each step.
 
     Yields:
         Linear RGB `[size, size, size, 3]`.
     """
     domain = block_domain(size)
-    state = domain.seed(rule.config.channels)
-    told = np.zeros((len(domain), PRIORS), np.float32)
+    nothing = np.zeros((len(domain), PRIORS), np.float32)
+    session = open_session(rule.automaton(seed), domain, nothing, compute)
+    state = session.upload(domain.seed(rule.config.channels))
     done, waiting = 0, steps
     while True:
-        for number in range(done, done + waiting):
-            rows = changing_rows(
-                domain.hashes, seed=seed, step=number, probability=rule.config.update_probability
-            )
-            state = step(state, rows, domain.neighbours, told)
-        yield domain.scatter(colours(state[:-1]), domain.box)
+        state = session.run(state, range(done, done + waiting), watch)
+        yield domain.scatter(colours(session.read(state)[:-1]), domain.box)
         done, waiting = done + waiting, pause
 
 

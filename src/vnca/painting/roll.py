@@ -8,7 +8,7 @@ Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,15 +18,15 @@ from vnca.core.bricks.dense import dense, field_of
 from vnca.core.bricks.field import Field
 from vnca.core.typing import Box, FloatArray, IntArray
 from vnca.core.volume import Volume
+from vnca.engine.backend import open_session
 from vnca.engine.domain import Domain, DomainKind
-from vnca.engine.mask import changing_rows
+from vnca.engine.session import Compute
 from vnca.io.orientation import on_one_lattice
 from vnca.io.velocity import extrapolated
 from vnca.painting.config import StylizeConfig
 from vnca.rule.conditioning import priors
 from vnca.rule.paint import colours, density_factors
 from vnca.rule.rule import SMOKE_THRESHOLD, Rule
-from vnca.rule.stepper import Step
 
 UNPAINTED = 1.0
 """Linear colour of smoke far from all that the rule paints: white."""
@@ -102,17 +102,17 @@ class Roll:
 
     Attributes:
         rule: The trained rule.
-        step: The kernel that applies it.
-        config: How.
+        config: How it is applied.
         box: Holds the smoke of all frames, in cells of the lattice that they share. Known from the
             files' headers before the first frame is read.
+        compute: How steps are computed.
         fringe: How many cells beyond the living ones their colour goes on.
     """
 
     rule: Rule
-    step: Step
     config: StylizeConfig
     box: Box
+    compute: Compute = field(default_factory=Compute)
     fringe: int = FRINGE
 
     @property
@@ -163,14 +163,9 @@ class Roll:
             values = Domain(state.cells, domain.box).carry(state.values, domain)
         told = priors(domain, smoke, rule)
         done = state.steps_done + steps
-        for number in range(state.steps_done, done):
-            rows = changing_rows(
-                domain.hashes,
-                seed=config.seed,
-                step=number,
-                probability=rule.config.update_probability,
-            )
-            values = self.step(values, rows, domain.neighbours, told)
+        session = open_session(rule.automaton(config.seed), domain, told, self.compute)
+        uploaded = session.upload(values)
+        values = session.read(session.run(uploaded, range(state.steps_done, done)))
         return RollState(domain.cells, values, done)
 
     def _shown(self, smoke: Volume, state: RollState) -> Painting:
@@ -209,11 +204,11 @@ class Roll:
 def stylize(
     frames: Iterable[Volume],
     rule: Rule,
-    step: Step,
     config: StylizeConfig,
     *,
     box: Box,
     refine: int = 1,
+    compute: Compute | None = None,
 ) -> Iterator[Painting]:
     """Paint a sequence frame by frame, reading one at a time.
 
@@ -225,7 +220,7 @@ def stylize(
     Raises:
         GridError: If its cells are not cubic, or a frame can have no place on them.
     """
-    roll = Roll(rule, step, config, box).refined(refine)
+    roll = Roll(rule, config, box, compute or Compute()).refined(refine)
     state = roll.start()
     for smoke in on_one_lattice(frames):
         painting = roll.paint(smoke.refined(refine), state)

@@ -8,8 +8,9 @@ import numpy as np
 from vnca.core.errors import OptionError, ShapeError
 from vnca.core.lattice import Region
 from vnca.core.typing import FloatArray
+from vnca.engine.automaton import Automaton, Weights
 from vnca.engine.domain import DomainKind
-from vnca.engine.stencil import FILTERS
+from vnca.engine.stencil import FILTERS, stencil
 from vnca.rule.decoder import Decoder
 
 PRIORS = 7
@@ -153,6 +154,15 @@ class Rule:
             config=config,
             scales=scales,
         )
+
+    def automaton(self, seed: int) -> Automaton:
+        """What a session steps; `seed` is that of the update mask."""
+        filters = stencil(
+            sobel_divisor=self.config.sobel_divisor,
+            laplacian_divisor=self.config.laplacian_divisor,
+        )
+        weights = Weights(self.hidden, self.bias, self.output)
+        return Automaton(weights, filters, self.config.update_probability, seed)
 
     def refined(self, factor: int) -> "Rule":
         """The rule for cells `factor` times as fine, where it does in a step what it did before.

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from math import inf
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
@@ -70,8 +70,8 @@ class CourseConfig(ABC):
     features: str = "efficientnet"
     """Network that compares pictures: efficientnet, edges, imagenet, vgg16 (imagenet where it was
     fetched before, else edges), or the path of a VGG's weights."""
-    backend: Literal["auto", "native", "triton", "reference"] = "auto"
-    """What computes the automaton."""
+    backend: str = "auto"
+    """What computes the automaton: auto, native, triton or reference."""
     seed: int = 0
     """Same seed, same machine, same result."""
 

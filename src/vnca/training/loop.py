@@ -3,10 +3,8 @@
 Reference: VNCA sections 3.4 and 5.
 """
 
-import dataclasses
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +13,9 @@ from torch import Tensor
 
 from vnca.core.errors import DivergenceError
 from vnca.core.typing import FloatArray
-from vnca.engine.backend import torch_step
-from vnca.engine.mask import changing_rows
-from vnca.engine.reference.step import Weights
-from vnca.engine.stencil import stencil
+from vnca.engine.automaton import Weights
+from vnca.engine.backend import open_session
+from vnca.engine.session import Compute
 from vnca.features.network import FeatureNetwork
 from vnca.losses.appearance import AppearanceLoss
 from vnca.losses.overflow import overflow
@@ -60,8 +57,7 @@ class Trainer:
     Attributes:
         config: The hyperparameters.
         scene: What is trained on.
-        step: What computes the automaton, called as `vnca.engine.reference.step.update` is;
-            another that does the same may take its place.
+        session: What computes the automaton; another that does the same may take its place.
         iteration: Iterations done.
         kept_states: How many states of a rollout are kept at a time, at most.
     """
@@ -104,13 +100,13 @@ class Trainer:
         )
         if not scene.paints_density:
             self._weights.output.register_hook(_without_density)
-        self.step = torch_step(config.backend, device=device.type)
-        self._stencil = torch.from_numpy(
-            stencil(
-                sobel_divisor=config.rule.sobel_divisor,
-                laplacian_divisor=config.rule.laplacian_divisor,
-            )
-        ).to(device)
+        self.session = open_session(
+            replace(rule.automaton(config.seed), weights=self._weights),
+            scene.domain,
+            scene.priors,
+            Compute(config.backend, str(device)),
+            differentiable=True,
+        )
         self._appearance = AppearanceLoss(
             network, style, config.appearance, config.pictures.size, scene.width
         )
@@ -274,29 +270,13 @@ class Trainer:
 
     def _roll(self, state: Tensor, steps: range, scene: Scene[Any]) -> Tensor:
         """The state after the numbered steps of the rule; differentiable in the weights."""
-        advance = partial(self._advance, scene)
-        return roll_out(advance, state, steps, kept_states=self.kept_states)
-
-    def _advance(self, scene: Scene[Any], state: Tensor, step: int) -> Tensor:
-        rows = changing_rows(
-            scene.domain.hashes,
-            seed=self.config.seed,
-            step=step,
-            probability=self.config.rule.update_probability,
-        )
-        return self.step(
-            state,
-            torch.from_numpy(rows).to(state.device),
-            scene.neighbours,
-            scene.priors,
-            self._weights,
-            self._stencil,
-        )
+        session = self.session.conditioned(scene.priors)
+        return roll_out(session.step, state, steps, kept_states=self.kept_states)
 
     def rule(self) -> Rule:
         """The rule as it is now."""
         hidden, bias, output = (w.detach().cpu().numpy().copy() for w in self._weights)
-        return dataclasses.replace(self._rule, hidden=hidden, bias=bias, output=output)
+        return replace(self._rule, hidden=hidden, bias=bias, output=output)
 
     @staticmethod
     def _overflow(cells: Tensor) -> Tensor:

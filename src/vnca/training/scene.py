@@ -19,7 +19,6 @@ class Scene(ABC, Generic[Sight]):
 
     Attributes:
         domain: The cells that live.
-        neighbours: `[27, n]` rows of the state around each cell.
         priors: `[n, 7]`.
         samples: About how many are taken along the ray of a pixel.
         width: Cells across a picture.
@@ -35,7 +34,6 @@ class Scene(ABC, Generic[Sight]):
     ) -> None:
         """Put the cells and what they are told, `[n, 7]`, where is computed."""
         self.domain, self.width = domain, width
-        self.neighbours = torch.from_numpy(domain.neighbours).to(device)
         self.priors = torch.from_numpy(priors).to(device)
         self._places = torch.from_numpy(domain.places).to(device)
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import torch
 
+from vnca.engine.automaton import Weights
 from vnca.engine.domain import Domain
 from vnca.engine.mask import changing_rows
 from vnca.engine.numpy import step as array_reference
 from vnca.engine.reference import step as reference
-from vnca.engine.reference.step import Weights
 from vnca.engine.stencil import stencil
 
 
@@ -29,7 +29,7 @@ def test_it_agrees_with_the_reference(
     state[-1] = 0
     rows = changing_rows(domain.hashes, seed=0, step=1, probability=probability)
     filters = stencil(sobel_divisor=30.0)
-    got = array_reference.update(state, rows, domain.neighbours, told, *weights, filters)
+    got = array_reference.update(state, rows, domain.neighbours, told, Weights(*weights), filters)
     expected = reference.update(
         torch.from_numpy(state).double(),
         torch.from_numpy(rows),

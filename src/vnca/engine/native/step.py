@@ -8,12 +8,14 @@ else, also their sums, stays float32. How large the error is says the README bes
 
 import os
 from collections.abc import Callable
-from typing import Any, Literal, ParamSpec, TypeVar, get_args
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from vnca.core.errors import BackendUnavailableError, OptionError, ShapeError
 from vnca.core.typing import FloatArray, IntArray
+from vnca.engine.mask import mask_key, mask_threshold
+from vnca.engine.session import PRECISIONS
 
 try:
     import vnca.engine.native._native as _native  # pyright: ignore[reportMissingModuleSource]
@@ -23,19 +25,16 @@ except ImportError as error:
 
 P = ParamSpec("P")
 T = TypeVar("T")
-Precision = Literal["float32", "bfloat16"]
-"""Of the factors of the matrix products."""
 
 
-def unavailable(precision: Precision = "float32") -> str | None:
+def unavailable(precision: str = "float32") -> str | None:
     """Why the native kernel cannot run here, or nothing if it can.
 
     Raises:
         OptionError: If there is no precision of that name.
     """
-    if precision not in get_args(Precision):
-        expected = " or ".join(get_args(Precision))
-        raise OptionError(f"precision: expected {expected}, got {precision}")
+    if precision not in PRECISIONS:
+        raise OptionError(f"precision: expected {' or '.join(PRECISIONS)}, got {precision}")
     if _native is None:
         return (
             f"its extension was not built, or does not load ({_reason}); "
@@ -49,7 +48,7 @@ def unavailable(precision: Precision = "float32") -> str | None:
     return None
 
 
-def instructions(precision: Precision = "float32") -> list[str]:
+def instructions(precision: str = "float32") -> list[str]:
     """Instruction sets that the kernel can use on this machine, the default first.
 
     Raises:
@@ -66,6 +65,28 @@ def default_threads() -> int:
     return os.cpu_count() or 1
 
 
+def changing_rows(hashes: IntArray, *, seed: int, step: int, probability: float) -> IntArray:
+    """Rows `[m]` of the cells that change, as `vnca.engine.mask.changing_rows` draws them.
+
+    Args:
+        hashes: `[n]`, the bits of `hash_cells` as int32.
+        seed: Any integer; its low 32 bits count.
+        step: Steps since the state was seeded.
+        probability: Chance of a cell to change, in (0, 1].
+
+    Raises:
+        BackendUnavailableError: If the extension was not built.
+        ShapeError: If the hashes are not int32 and contiguous.
+    """
+    rows = np.empty(len(hashes), dtype=np.int32)
+    if probability >= 1:
+        rows[:] = np.arange(len(hashes))
+        return rows
+    drawn = (hashes, int(mask_key(seed, step)), int(mask_threshold(probability)), rows)
+    count = checked("update mask", extension().changing_rows, *drawn)
+    return rows[:count]
+
+
 def forward(
     state: FloatArray,
     rows: IntArray,
@@ -78,7 +99,7 @@ def forward(
     *,
     threads: int | None = None,
     out: FloatArray | None = None,
-    precision: Precision = "float32",
+    precision: str = "float32",
     instructions: str = "",
 ) -> FloatArray:
     """The state after one step: s' = s + W2 relu(W1 [z ‖ priors] + b1) on `rows`, s elsewhere.
@@ -128,7 +149,7 @@ def backward(
     gradient: FloatArray,
     *,
     threads: int | None = None,
-    precision: Precision = "float32",
+    precision: str = "float32",
     instructions: str = "",
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Gradients of the state `[n + 1, C]`, W1, b1 and W2 from the gradient of `forward`'s result.
@@ -146,7 +167,7 @@ def backward(
     return to_state, to_hidden, to_bias, to_output
 
 
-def extension(precision: Precision = "float32") -> Any:
+def extension(precision: str = "float32") -> Any:
     """The module of the native kernels.
 
     Raises:

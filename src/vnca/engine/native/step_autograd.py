@@ -7,8 +7,8 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from vnca.core.typing import AnyArray
+from vnca.engine.automaton import Weights
 from vnca.engine.native import step as native
-from vnca.engine.reference.step import Weights
 
 
 def update(
@@ -20,7 +20,7 @@ def update(
     stencil: Tensor,
     *,
     threads: int | None = None,
-    precision: native.Precision = "float32",
+    precision: str = "float32",
 ) -> Tensor:
     """The state after one step, as `vnca.engine.reference.step.update` has it.
 
@@ -44,6 +44,12 @@ def update(
     result = _Update.apply(state, rows, neighbours, priors, *weights, stencil, threads, precision)
     assert isinstance(result, Tensor)
     return result
+
+
+def changing_rows(hashes: Tensor, *, seed: int, step: int, probability: float) -> Tensor:
+    """Rows `[m]` of the cells that change, as `native.changing_rows` draws them."""
+    rows = native.changing_rows(_array(hashes), seed=seed, step=step, probability=probability)
+    return torch.from_numpy(rows)
 
 
 class _Update(torch.autograd.Function):

@@ -6,6 +6,7 @@
 import numpy as np
 
 from vnca.core.typing import FloatArray, IntArray
+from vnca.engine.automaton import Weights
 
 SLAB = 4096
 """Cells worked through at a time: their perception and hidden layer stay in cache."""
@@ -16,12 +17,11 @@ def update(
     rows: IntArray,
     neighbours: IntArray,
     priors: FloatArray,
-    hidden: FloatArray,
-    bias: FloatArray,
-    output: FloatArray,
+    weights: Weights,
     stencil: FloatArray,
 ) -> FloatArray:
-    """The state `[n + 1, C]` after one step; arguments are those of `native.forward`."""
+    """The state `[n + 1, C]` after one step; arguments are those of the reference."""
+    hidden, bias, output = weights
     result = state.copy()
     for start in range(0, len(rows), SLAB):
         slab = rows[start : start + SLAB]

@@ -1,1 +1,35 @@
 """The reference in torch: written to be read, never called by a fast path."""
+
+import importlib.util
+from typing import Any
+
+from vnca.engine.backend import Backend
+from vnca.engine.session import Compute, Job, Session
+
+
+class ReferenceBackend(Backend):
+    """Runs wherever torch does, slowly."""
+
+    name = "reference"
+
+    def missing(self, compute: Compute) -> str | None:
+        """See `Backend.missing`."""
+        if importlib.util.find_spec("torch") is None:
+            return "it needs torch; install vnca[train]"
+        return None
+
+    def session(self, job: Job) -> Session:
+        """See `Backend.session`."""
+        from vnca.engine.reference.mask import changing_rows
+        from vnca.engine.tensors import tensor_session
+
+        return tensor_session(job, draw=changing_rows, update=self.update())
+
+    def update(self, *, threads: int | None = None, precision: str = "float32") -> Any:
+        """See `Backend.update`."""
+        from vnca.engine.reference.step import update
+
+        return update
+
+
+BACKEND = ReferenceBackend()

@@ -1,26 +1,14 @@
 """One step of the automaton, written to be read; differentiable; float32 and float64."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 from torch import Tensor
 
+from vnca.engine.automaton import Weights
+
 SLAB = 4096
 """Cells worked through at a time: their perception and hidden layer stay in cache."""
-
-
-class Weights(NamedTuple):
-    """The trained weights of a rule.
-
-    Attributes:
-        hidden: W1 `[hidden, 5C + P]`.
-        bias: b1 `[hidden]`.
-        output: W2 `[C, hidden]`.
-    """
-
-    hidden: Tensor
-    bias: Tensor
-    output: Tensor
 
 
 def perceive(neighbourhood: Tensor, stencil: Tensor) -> Tensor:

@@ -12,6 +12,7 @@
 
 #include "arrays.hpp"
 #include "bind_decode.hpp"
+#include "mask.hpp"
 #include "step.hpp"
 
 using namespace vnca;
@@ -118,6 +119,15 @@ NB_MODULE(_native, m) {
         std::vector<std::string> names;
         for (const Kernel* const kernel : kernels_for(bfloat16)) names.emplace_back(kernel->name);
         return names;
+    });
+
+    m.def("changing_rows", [](Input hashes, std::uint32_t key, std::uint32_t threshold, Output rows) {
+        const std::int64_t n = length(hashes, 0);
+        const auto* const from = data_of<std::int32_t>(hashes, "hashes", {ANY});
+        auto* const to = data_of<std::int32_t>(rows, "rows", {n});
+        check_apart({rows}, {hashes});
+        nb::gil_scoped_release released;
+        return changing_rows(from, n, key, threshold, to);
     });
 
     m.def("forward", [](Input state, Input rows, Input neighbours, Input priors, Input first,

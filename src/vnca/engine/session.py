@@ -1,0 +1,170 @@
+"""A session: an automaton on the active cells of a domain, kept where it is computed."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from vnca.core.errors import OptionError
+from vnca.core.typing import FloatArray
+from vnca.engine.automaton import Automaton, Weights
+from vnca.engine.domain import Domain
+
+PRECISIONS = ("float32", "bfloat16")
+"""What a backend may round the factors of its products to; states and sums stay float32."""
+
+
+@dataclass(frozen=True)
+class Compute:
+    """How to compute."""
+
+    backend: str = "auto"
+    """auto takes the fastest that is there; native, triton, numpy or reference that one."""
+    device: str = "cpu"
+    """cpu, cuda, or one of several GPUs, such as cuda:1."""
+    precision: str = "float32"
+    """What the native backend rounds the factors of its products to; bfloat16 is quicker where the
+    processor has it."""
+    threads: int | None = None
+    """Threads of the native backend; one for each core unless given."""
+
+    def __post_init__(self) -> None:
+        if self.precision not in PRECISIONS:
+            raise OptionError(f"`precision` {self.precision}: expected {' or '.join(PRECISIONS)}")
+        if self.threads is not None and self.threads < 1:
+            raise OptionError(f"`threads` {self.threads}: at least 1 is needed")
+
+    @property
+    def device_type(self) -> str:
+        """Kind of the device, as torch names it."""
+        return self.device.partition(":")[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What a session is opened for.
+
+    Attributes:
+        automaton: Weights, filters and mask.
+        domain: The active cells.
+        conditioning: `[n, P]` of the cells.
+        compute: How to compute.
+        differentiable: Whether states are tensors through which gradients flow.
+    """
+
+    automaton: Automaton
+    domain: Domain
+    conditioning: Any
+    compute: Compute
+    differentiable: bool
+
+
+class Session(ABC):
+    """An automaton on the active cells of a domain.
+
+    What `upload` returns is a state in the backend's own arrays; nothing but `read` brings it back.
+    """
+
+    @abstractmethod
+    def upload(self, state: FloatArray) -> Any:
+        """A state `[n + 1, C]`, last row zero, where it is computed."""
+
+    @abstractmethod
+    def step(self, state: Any, number: int) -> Any:
+        """The state after the step of a number, from which its mask follows.
+
+        Differentiable in the state and the weights if the session was opened so.
+        """
+
+    @abstractmethod
+    def read(self, state: Any) -> FloatArray:
+        """The state as a numpy array."""
+
+    @abstractmethod
+    def conditioned(self, conditioning: Any) -> "Session":
+        """The same automaton on the same cells, conditioned on something else, `[n, P]`."""
+
+    def run(self, state: Any, numbers: range, watch: Callable[[], None] | None = None) -> Any:
+        """The state after the steps of some numbers; `watch` is called after each."""
+        for number in numbers:
+            state = self.step(state, number)
+            if watch is not None:
+                watch()
+        return state
+
+
+@dataclass(frozen=True, eq=False)
+class StepSession(Session):
+    """A session that draws the rows of cells that change, then updates them: of most backends.
+
+    Attributes:
+        automaton: Its weights are where the rest is.
+        neighbours: `[27, n]` rows of the state around each active cell.
+        hashes: `[n]` for the mask, the bits as int32.
+        stencil: `[5, 27]`.
+        conditioning: `[n, P]`.
+        draw: The rows `[m]` that change, from hashes, seed, step and probability.
+        update: The step, called as `vnca.engine.reference.step.update` is.
+        place: Brings an array to where it is computed.
+        back: Brings one from there.
+    """
+
+    automaton: Automaton
+    neighbours: Any
+    hashes: Any
+    stencil: Any
+    conditioning: Any
+    draw: Callable[..., Any]
+    update: Callable[..., Any]
+    place: Callable[[Any], Any]
+    back: Callable[[Any], FloatArray]
+
+    @classmethod
+    def open(
+        cls,
+        job: Job,
+        *,
+        draw: Callable[..., Any],
+        update: Callable[..., Any],
+        place: Callable[[Any], Any] = np.asarray,
+        back: Callable[[Any], FloatArray] = np.asarray,
+    ) -> "StepSession":
+        """Bring everything to its place; without one it stays in main memory."""
+        automaton = job.automaton
+        return cls(
+            replace(automaton, weights=Weights(*map(place, automaton.weights))),
+            place(job.domain.neighbours),
+            place(job.domain.hashes.view(np.int32)),
+            place(automaton.stencil),
+            place(job.conditioning),
+            draw,
+            update,
+            place,
+            back,
+        )
+
+    def conditioned(self, conditioning: Any) -> "StepSession":
+        """See `Session.conditioned`."""
+        return replace(self, conditioning=self.place(conditioning))
+
+    def upload(self, state: FloatArray) -> Any:
+        """See `Session.upload`."""
+        return self.place(state)
+
+    def step(self, state: Any, number: int) -> Any:
+        """See `Session.step`."""
+        automaton = self.automaton
+        rows = self.draw(
+            self.hashes,
+            seed=automaton.seed,
+            step=number,
+            probability=automaton.update_probability,
+        )
+        surroundings = (self.neighbours, self.conditioning)
+        return self.update(state, rows, *surroundings, automaton.weights, self.stencil)
+
+    def read(self, state: Any) -> FloatArray:
+        """See `Session.read`."""
+        return self.back(state)
