@@ -45,7 +45,7 @@ from vnca.training.flow.displacement import random_displacement
 from vnca.training.flow.pairs import moving_texture, random_silhouette
 from vnca.training.flow.textures import KINDS, Kind, bank, cut, log_uniform, uniform
 from vnca.training.scenes.smoke import smoke_bounds
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import choose_scales
 
 PICTURES = ("full", "masked", "smoke")
@@ -157,7 +157,7 @@ def plume() -> tuple[Tensor, Tensor, float]:
     """Density in units of its scale, velocity in cells a frame, and the extinction of one."""
     caches = SmokeFormat(velocity_units="mantaflow", time_scale=0.4)
     smoke = read_smoke(PLUME, caches)
-    scales = choose_scales(smoke, TrainConfig())
+    scales = choose_scales(smoke, SmokeConfig())
     box = smoke_bounds(smoke, scales.density)
     inside = box.slices(smoke.box)
     assert smoke.velocity is not None

@@ -43,7 +43,7 @@ def vary(study: Brightness) -> None:
                 findings.add(f"{mode}, {times(gamma)}", measures, seed=seed)
             if seed == study.seeds[0]:
                 pictures[mode] = {
-                    times(gamma): judge.portrait(painting, rule, gamma=gamma, mode=mode)
+                    times(gamma): judge.preview_view(painting, rule, gamma=gamma, mode=mode)
                     for gamma in study.gammas
                 }
     findings.tell()
@@ -58,8 +58,11 @@ def seen(
     judge: Judge, painting: Painting, rule: Rule, gamma: float, mode: Mode
 ) -> dict[str, float]:
     """How bright and opaque a painting is from all around, and how far from the picture."""
-    views = [judge.look(painting, rule, sight, gamma=gamma, mode=mode) for sight in AROUND]
-    covered = [judge.look(painting, rule, sight, mode="sane").opacity > 0.5 for sight in AROUND]
+    views = [judge.look(painting, rule, viewpoint, gamma=gamma, mode=mode) for viewpoint in AROUND]
+    covered = [
+        judge.look(painting, rule, viewpoint, mode="emission-absorption").opacity > 0.5
+        for viewpoint in AROUND
+    ]
 
     def mean(values: Sequence[Tensor]) -> float:
         chosen = [value[where] for value, where in zip(values, covered, strict=True)]

@@ -76,8 +76,8 @@ def painting(study: Cost, judge: Judge, rule: Rule, smoke: Volume) -> dict[str, 
         latest = roll.paint(smoke, latest.state)
     painted = time.perf_counter()
     for repeat in range(study.repeats):
-        sight = AROUND[repeat % len(AROUND)]
-        judge.look(latest, rule, sight, size=study.picture_size).colour.cpu()
+        viewpoint = AROUND[repeat % len(AROUND)]
+        judge.look(latest, rule, viewpoint, size=study.picture_size).colour.cpu()
     looked = time.perf_counter()
     return {
         "cells": len(latest.state.cells),

@@ -13,7 +13,7 @@ from judge import UNPAINTED, Judge, paint
 from study import REFERENCE, Findings, Study, run
 
 from vnca.engine.domain import DomainKind
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 
 DOMAINS = {"active": "smoke", "box": "its box"}
 
@@ -31,7 +31,7 @@ class Density(Study):
     """Tell cells their place in the box, as the preset of --full does anyway."""
 
     @property
-    def config(self) -> TrainConfig:
+    def config(self) -> SmokeConfig:
         """That of the reference."""
         config = super().config
         rule = replace(

@@ -52,11 +52,11 @@ def generalise(study: Generalisation) -> None:
     judge, findings = Judge(study), Findings(study, "generalisation")
     pictures = {}
     for seed, rule in study.rules(REFERENCE, study.config):
-        measures, portraits = {}, {}
+        measures, preview_views = {}, {}
         for painting in painted(study, rule):
             name = f"frame {painting.smoke.frame}"
             measures[name] = judged(judge, painting, rule)
-            portraits[name] = judge.portrait(painting, rule)
+            preview_views[name] = judge.preview_view(painting, rule)
             findings.add("sequence", measures[name], seed=seed, on=name)
         findings.add("sequence", means([*measures.values()]), seed=seed, on="all frames")
         others = {"jets": last(simulate("jets", resolution=RESOLUTION, frames=LATE, seed=0))}
@@ -65,11 +65,11 @@ def generalise(study: Generalisation) -> None:
         for name, painting in paintings.items():
             findings.add("unseen", judged(judge, painting, rule), seed=seed, on=name)
         if seed == study.seeds[0]:
-            names = [*portraits]
+            names = [*preview_views]
             chosen = np.linspace(0, len(names) - 1, SHOWN).round().astype(int)
-            pictures["sequence"] = {names[at]: portraits[names[at]] for at in chosen}
+            pictures["sequence"] = {names[at]: preview_views[names[at]] for at in chosen}
             pictures["unseen"] = {
-                name: judge.portrait(painting, rule) for name, painting in paintings.items()
+                name: judge.preview_view(painting, rule) for name, painting in paintings.items()
             }
     findings.tell()
     study.picture("generalisation", judge.sheet(pictures))

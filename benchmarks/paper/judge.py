@@ -19,13 +19,17 @@ from vnca.painting.roll import Painting, Roll
 from vnca.rendering.colour import linear_to_srgb
 from vnca.rendering.view import Mode, View, render
 from vnca.rule.rule import Rule
-from vnca.training.scenes.smoke import PORTRAIT_BACKGROUND, PORTRAIT_STEP, PORTRAITS, smoke_bounds
+from vnca.training.scenes.smoke import PREVIEW_BACKGROUND, PREVIEW_STEP, PREVIEW_VIEWS, smoke_bounds
 
-Sight = tuple[float, float]
+Viewpoint = tuple[float, float]
 """Azimuth and elevation, degrees."""
-AROUND: tuple[Sight, ...] = tuple((azimuth, 10.0) for azimuth in np.arange(22.5, 360, 45).tolist())
+AROUND: tuple[Viewpoint, ...] = tuple(
+    (azimuth, 10.0) for azimuth in np.arange(22.5, 360, 45).tolist()
+)
 """Views from all around."""
-SIDES: Mapping[str, Sight] = dict(zip(("front", "right", "back", "above"), PORTRAITS, strict=True))
+SIDES: Mapping[str, Viewpoint] = dict(
+    zip(("front", "right", "back", "above"), PREVIEW_VIEWS, strict=True)
+)
 """Views by name; a training of a single view has only the front."""
 PORTRAIT_SIZE = 192
 """Rows and columns of a picture on a sheet, pixels."""
@@ -67,7 +71,7 @@ class Judge:
         self,
         painting: Painting,
         rule: Rule,
-        sight: Sight,
+        viewpoint: Viewpoint,
         *,
         size: int | None = None,
         step: float | None = None,
@@ -79,7 +83,7 @@ class Judge:
         Args:
             painting: What is looked at.
             rule: The normalisers are its.
-            sight: Where from.
+            viewpoint: Where from.
             size: Rows and columns, pixels.
             step: Distance between samples along a ray, cells.
             gamma: What the rule's extinction is multiplied by.
@@ -95,7 +99,7 @@ class Judge:
         return render(
             density,
             colour,
-            frame_box(lower.tolist(), upper.tolist(), *sight),
+            frame_box(lower.tolist(), upper.tolist(), *viewpoint),
             rows=size or self.view.size,
             columns=size or self.view.size,
             gamma=scales.gamma * gamma,
@@ -118,28 +122,30 @@ class Judge:
 
     def around(self, painting: Painting, rule: Rule) -> dict[str, float]:
         """The distance from all around."""
-        return self.distance(self.look(painting, rule, sight) for sight in AROUND)
+        return self.distance(self.look(painting, rule, viewpoint) for viewpoint in AROUND)
 
-    def portrait(
+    def preview_view(
         self,
         painting: Painting,
         rule: Rule,
-        sight: Sight = SIDES["front"],
+        viewpoint: Viewpoint = SIDES["front"],
         *,
         gamma: float = 1.0,
         mode: Mode | None = None,
     ) -> FloatArray:
         """A picture for people to look at, linear RGB `[r, c, 3]`."""
         mode = mode or self.view.mode
-        step = PORTRAIT_STEP if mode == "sane" else self.view.step
+        step = PREVIEW_STEP if mode == "emission-absorption" else self.view.step
         view = self.look(
-            painting, rule, sight, size=PORTRAIT_SIZE, step=step, gamma=gamma, mode=mode
+            painting, rule, viewpoint, size=PORTRAIT_SIZE, step=step, gamma=gamma, mode=mode
         )
-        return view.over([PORTRAIT_BACKGROUND] * 3).clamp(0, 1).cpu().numpy()
+        return view.over([PREVIEW_BACKGROUND] * 3).clamp(0, 1).cpu().numpy()
 
     def sides(self, painting: Painting, rule: Rule) -> dict[str, FloatArray]:
         """Pictures from all sides, by name."""
-        return {side: self.portrait(painting, rule, sight) for side, sight in SIDES.items()}
+        return {
+            side: self.preview_view(painting, rule, viewpoint) for side, viewpoint in SIDES.items()
+        }
 
     def sheet(self, rows: Mapping[str, Mapping[str, FloatArray]]) -> FloatArray:
         """Rows of pictures after the style, each with the names of its row and its own."""

@@ -28,12 +28,12 @@ from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule, RuleConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME
 from vnca.training.config import PoolConfig
-from vnca.training.smoke_config import PRESETS, TrainConfig, ViewConfig
+from vnca.training.smoke_config import PRESETS, SmokeConfig, ViewConfig
 
 ROOT = Path(__file__).parents[2]
 REFERENCE = "reference"
 """The rule that nothing was taken from; all studies share it."""
-DRAFT = TrainConfig(
+DRAFT = SmokeConfig(
     rule=RuleConfig(position_prior=False),
     view=ViewConfig(size=96),
     pool=PoolConfig(size=16),
@@ -81,7 +81,7 @@ class Study:
         return "paper" if self.full else "draft"
 
     @property
-    def config(self) -> TrainConfig:
+    def config(self) -> SmokeConfig:
         """That of the reference."""
         plan = PRESETS["paper"] if self.full else DRAFT
         return replace(
@@ -109,12 +109,12 @@ class Study:
         """
         return read_smoke(self.frame, self.smoke)
 
-    def rules(self, name: str, config: TrainConfig) -> Iterator[tuple[int, Rule]]:
+    def rules(self, name: str, config: SmokeConfig) -> Iterator[tuple[int, Rule]]:
         """A seed and the rule trained with it, for each seed; see `trained`."""
         for seed in self.seeds:
             yield seed, self.trained(name, config, seed)
 
-    def trained(self, name: str, config: TrainConfig, seed: int, *, anew: bool = False) -> Rule:
+    def trained(self, name: str, config: SmokeConfig, seed: int, *, anew: bool = False) -> Rule:
         """A rule that is trained now, unless it was before.
 
         Args:
@@ -148,7 +148,7 @@ class Study:
             )
         return Model.load(folder).rule
 
-    def _key(self, config: TrainConfig) -> str:
+    def _key(self, config: SmokeConfig) -> str:
         """Another for all that a run depends on: what is trained on, and how."""
         found = hashlib.sha256(json.dumps([asdict(config), asdict(self.smoke)]).encode())
         for path in (self.frame, self.style):

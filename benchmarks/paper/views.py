@@ -22,8 +22,8 @@ def compare(study: Study) -> None:
     for kind, kind_config in kinds.items():
         for seed, rule in study.rules(kind.replace(" ", "_"), kind_config):
             painting = paint(rule, smoke)
-            for side, sight in SIDES.items():
-                seen = judge.distance([judge.look(painting, rule, sight)])
+            for side, viewpoint in SIDES.items():
+                seen = judge.distance([judge.look(painting, rule, viewpoint)])
                 findings.add(kind, seen, seed=seed, on=side)
             findings.add(kind, judge.around(painting, rule), seed=seed, on="around")
             if seed == study.seeds[0]:

@@ -41,12 +41,12 @@ def main(folder: str) -> None:
             baked, film = work / f"{name}_{mesh}.glb", FILMS / f"{name}_{mesh}.webp"
             made(baked, "texture", "bake", run, source, "--out", baked, "--block", 96)
             made(film, "texture", "turntable", baked, "--out", film, *FILM)
-            row += portraits(baked)
+            row += preview_views(baked)
         rows.append(row)
     write_image(FILMS / "sheet.jpg", contact_sheet(rows, background=(0.9, 0.9, 0.9)))
 
 
-def portraits(baked: Path) -> list[FloatArray]:
+def preview_views(baked: Path) -> list[FloatArray]:
     """A textured mesh from two sides."""
     mesh = read_mesh(baked)
     sides = [TurntableConfig(rows=SIZE, columns=SIZE, azimuth=azimuth) for azimuth in AZIMUTHS]

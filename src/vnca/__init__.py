@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from vnca.rule.rule import Rule, RuleConfig, Scales
     from vnca.simulation.scenes import simulate as simulate_smoke
     from vnca.training.loop import Trainer
-    from vnca.training.smoke_config import PRESETS, TrainConfig
+    from vnca.training.smoke_config import PRESETS, SmokeConfig
     from vnca.training.smoke_trainer import smoke_trainer
 
 # Functions that share the name of a subpackage have one of their own here: an imported
@@ -49,7 +49,7 @@ _HOMES = {
     "Scales": "rule.rule",
     "SmokeFormat": "io.smoke",
     "StylizeConfig": "painting.config",
-    "TrainConfig": "training.smoke_config",
+    "SmokeConfig": "training.smoke_config",
     "Trainer": "training.loop",
     "View": "rendering.view",
     "VncaError": "core.errors",
@@ -83,9 +83,9 @@ __all__ = [
     "Rule",
     "RuleConfig",
     "Scales",
+    "SmokeConfig",
     "SmokeFormat",
     "StylizeConfig",
-    "TrainConfig",
     "Trainer",
     "View",
     "VncaError",

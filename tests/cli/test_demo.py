@@ -13,11 +13,11 @@ from vnca.cli.simulate import Simulate, write_simulation
 from vnca.cli.stylize import Stylize, paint
 from vnca.losses.appearance import AppearanceConfig
 from vnca.rule.rule import RuleConfig
-from vnca.training.smoke_config import TrainConfig, ViewConfig
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 Vnca = Callable[..., Any]
 
-TINY = TrainConfig(
+TINY = SmokeConfig(
     rule=RuleConfig(channels=6, hidden=8, position_prior=False),
     view=ViewConfig(size=32),
     appearance=AppearanceConfig(samples=64, layers=("stem", "block1")),
@@ -48,7 +48,7 @@ def test_the_demo_makes_smoke_rule_painting_film_and_sheet(
         config = replace(options.config, warmup=2, steps_per_frame=1)
         paint(replace(options, film=film, config=config))
 
-    def config(_: Demo) -> TrainConfig:
+    def config(_: Demo) -> SmokeConfig:
         return TINY
 
     monkeypatch.setattr(demo, "write_simulation", small)

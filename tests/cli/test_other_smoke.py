@@ -14,7 +14,7 @@ from vnca.core.volume import Volume
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 
 Vnca = Callable[..., Any]
 QUICK = ("--warmup", 2, "--steps-per-frame", 1)
@@ -184,10 +184,10 @@ def test_a_rule_trained_without_velocity_is_never_told_one(
     is_told: bool,
 ) -> None:
     rename_velocity(frame, "wind")
-    seen: list[TrainConfig] = []
+    seen: list[SmokeConfig] = []
 
     def far_enough(
-        _smoke: object, _style: object, config: TrainConfig, *_: object, **__: object
+        _smoke: object, _style: object, config: SmokeConfig, *_: object, **__: object
     ) -> None:
         seen.append(config)
         raise OptionError("far enough")

@@ -25,7 +25,7 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import stylize
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule, RuleConfig, Scales
-from vnca.training.smoke_config import TrainConfig, ViewConfig
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 from vnca.training.smoke_trainer import smoke_trainer
 
 Vnca = Callable[..., Any]
@@ -152,7 +152,7 @@ def test_a_rule_learns_the_same_however_cells_are_counted(
     tiny_smoke: Volume, tmp_path: Path, turn: int, step: Index, up: str
 ) -> None:
     """Takes two trainings of an iteration and the network that judges them: seconds."""
-    config = TrainConfig(
+    config = SmokeConfig(
         rule=RuleConfig(channels=5, hidden=8),
         view=ViewConfig(size=32),
         appearance=AppearanceConfig(samples=64, layers=("relu1_1", "relu2_1")),

@@ -16,7 +16,7 @@ from PIL import Image
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.loop import Progress, Trainer
-from vnca.training.smoke_config import PRESETS, TrainConfig
+from vnca.training.smoke_config import PRESETS, SmokeConfig
 
 Vnca = Callable[..., Any]
 Run = Callable[..., Path]
@@ -99,7 +99,7 @@ def test_every_hyperparameter_is_an_option(vnca: Vnca) -> None:
     outcome = vnca("train", "--help")
     assert outcome.code == 0
     words = outcome.out.replace(",", " ").split()
-    missing = [flag for flag in flags(TrainConfig()) if flag not in words]
+    missing = [flag for flag in flags(SmokeConfig()) if flag not in words]
     assert not missing
     assert "FRAME STYLE" in outcome.out
 

@@ -79,7 +79,7 @@ def test_a_box_can_live_as_a_whole_unless_it_is_absurdly_large() -> None:
     assert len(domain) == 3 * 4 * 5
     assert domain.scatter(np.ones(len(domain)), box).all()
     assert (domain.neighbours < len(domain)).all()
-    with pytest.raises(OptionError, match=r"--domain box: .* 134742016 cells.*--domain active"):
+    with pytest.raises(OptionError, match=r"`domain` box: .* 134742016 cells.*`domain` active"):
         Domain.filling(Box((0, 0, 0), (512, 512, 514)))
 
 

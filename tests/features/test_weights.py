@@ -165,7 +165,7 @@ def test_damaged_download_is_refused(
     pth: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "imagenet_url", lambda: pth.as_uri())
-    with pytest.raises(BackendUnavailableError, match=r"damaged.*88682ab5.*--features edges"):
+    with pytest.raises(BackendUnavailableError, match=r"damaged.*88682ab5.*`features` edges"):
         load_weights("imagenet")
     assert not list(cache.glob("*"))
 
@@ -184,7 +184,7 @@ def test_silent_server_is_given_up_soon(
     monkeypatch.setattr(download, "CONNECT_SECONDS", 0.2)
     monkeypatch.setenv("no_proxy", "*")
     started = time.monotonic()
-    with pytest.raises(BackendUnavailableError, match=r"no answer.*--features edges"):
+    with pytest.raises(BackendUnavailableError, match=r"no answer.*`features` edges"):
         load_weights("imagenet")
     assert time.monotonic() - started < 5
 
@@ -194,7 +194,7 @@ def test_refused_connection_names_the_alternatives(monkeypatch: pytest.MonkeyPat
         port = server.getsockname()[1]
     monkeypatch.setattr(module, "imagenet_url", lambda: f"http://127.0.0.1:{port}/vgg16.pth")
     monkeypatch.setenv("no_proxy", "*")
-    with pytest.raises(BackendUnavailableError, match=r"refused.*--features edges.*path"):
+    with pytest.raises(BackendUnavailableError, match=r"refused.*`features` edges.*path"):
         load_weights("imagenet")
 
 
@@ -288,7 +288,7 @@ def test_torchvision_tells_where_the_weights_are(monkeypatch: pytest.MonkeyPatch
 
 def test_missing_torchvision_is_told_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "torchvision.models", None)
-    with pytest.raises(BackendUnavailableError, match=r"pip install torchvision.*--features edges"):
+    with pytest.raises(BackendUnavailableError, match=r"pip install torchvision.*`features` edges"):
         load_weights("imagenet")
 
 

@@ -251,7 +251,7 @@ def test_one_number_with_two_files_is_refused(tmp_path: Path) -> None:
 
 def test_numbers_that_are_no_frames_do_not_fill_the_memory(tmp_path: Path) -> None:
     make(tmp_path, "s_1.vdb", "s_20260101120000.vdb")
-    with pytest.raises(SequenceError, match="choose some with --frames"):
+    with pytest.raises(SequenceError, match="choose some with `frames`"):
         find_frames(tmp_path)
     assert numbers(tmp_path, "1-5") == [1]
 

@@ -237,7 +237,7 @@ def test_slightly_negative_density_becomes_zero_and_more_is_refused(tmp_path: Pa
     volume = read_smoke(saved(tmp_path / "s.vdb", grid("density", values)), PLAIN)
     assert volume.density[0, 0, 0] == 0
     values[0, 0, 0] = -0.5
-    with pytest.raises(GridError, match=r"density goes from -0.5 .* --density-grid"):
+    with pytest.raises(GridError, match=r"density goes from -0.5 .* `density_grid`"):
         read_smoke(saved(tmp_path / "s.vdb", grid("density", values)), PLAIN)
 
 

@@ -68,7 +68,7 @@ def test_of_two_that_could_be_it_both_are_named_and_either_can_be_chosen(
     path = saved(tmp_path, *names)
     choices = [name.removesuffix("!") for name in names if name[-1] in "!xX"]
     assert len(choices) == 2
-    with pytest.raises(GridError, match=f"choose with --velocity-grid from {', '.join(choices)}$"):
+    with pytest.raises(GridError, match=f"choose with `velocity_grid` from {', '.join(choices)}$"):
         found(path)
     for choice in choices:
         assert found(path, choice)[0] == choice

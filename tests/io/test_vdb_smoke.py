@@ -124,6 +124,6 @@ def test_a_velocity_that_may_lie_where_nothing_is_found_is_not_taken_for_none(
     assert read_vdb_smoke(path, SmokeFormat()).velocity is not None
     path.write_bytes(data[:20] + b"\0" + data[21:])  # as a stream
     listed = r"density \(float\), odd \(points\), 1 more that cannot be found behind it"
-    with pytest.raises(GridError, match=rf"a\.vdb: no velocity among {listed}.*--velocity-grid"):
+    with pytest.raises(GridError, match=rf"a\.vdb: no velocity among {listed}.*`velocity_grid`"):
         read_vdb_smoke(path, SmokeFormat())
     assert read_vdb_smoke(path, SmokeFormat(velocity_grid="none")).density.values.sum() == 8

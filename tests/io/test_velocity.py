@@ -222,7 +222,7 @@ def test_a_fit_without_motion_or_velocity_is_refused() -> None:
 
 @pytest.mark.parametrize("factor", [-1, 0.1], ids=["mirrored", "far too slow"])
 def test_a_velocity_no_scale_can_mend_is_refused(factor: float) -> None:
-    with pytest.raises(GridError, match=r"no velocity scale up to 4 .* check --velocity-units"):
+    with pytest.raises(GridError, match=r"no velocity scale up to 4 .* check `velocity_units`"):
         fit_velocity_scale(scaled(swirl(0), factor), swirl(0.2))
 
 

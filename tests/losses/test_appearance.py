@@ -16,7 +16,7 @@ from vnca.core.typing import FloatArray
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
 from vnca.losses.appearance import Appearance, AppearanceConfig, AppearanceLoss
-from vnca.losses.pixels import luminance
+from vnca.losses.pixels import luma
 
 SIZE = 48
 # The deeper ones take most of the time.
@@ -253,7 +253,7 @@ def test_a_network_compares_the_layers_of_its_choice(
 
 def test_a_layer_of_another_network_is_named(network: FeatureNetwork, painting: FloatArray) -> None:
     config = AppearanceConfig(layers=("relu9_9",), style_scale=1.0)
-    with pytest.raises(OptionError, match=rf"'relu9_9'.*'{network.name}'.*--appearance.layers"):
+    with pytest.raises(OptionError, match=rf"'relu9_9'.*'{network.name}'.*`appearance.layers`"):
         AppearanceLoss(network, painting, config, SIZE)
 
 
@@ -292,7 +292,7 @@ def test_black_style_image_gives_finite_gradients(network: FeatureNetwork) -> No
     ],
 )
 def test_impossible_options_are_named(option: str, value: object) -> None:
-    with pytest.raises(OptionError, match=f"--appearance.{option.replace('_', '-')}"):
+    with pytest.raises(OptionError, match=f"`appearance.{option.replace('_', '_')}`"):
         AppearanceConfig(**{option: value})  # pyright: ignore[reportArgumentType]
 
 
@@ -316,10 +316,10 @@ def test_what_is_compared_in_grey_may_be_a_picture_of_its_own(
     network: FeatureNetwork, painting: FloatArray, loss: AppearanceLoss
 ) -> None:
     picture, opaque = noise(), torch.ones(1, SIZE, SIZE)
-    luma = luminance(picture)
-    assert loss(picture, opaque, generator(), luma).total == measured(loss, picture).total
+    grey = luma(picture)
+    assert loss(picture, opaque, generator(), grey).total == measured(loss, picture).total
     # Only what is in grey is another, and only that has a gradient.
-    other = luminance(noise(5)).requires_grad_()
+    other = luma(noise(5)).requires_grad_()
     config = AppearanceConfig(**{**few(network), "colour": False, "pixels": 0.0})
     grey_alone = AppearanceLoss(network, painting, config, SIZE)
     total = grey_alone(picture, opaque, generator(), other).total
@@ -334,5 +334,5 @@ def test_what_is_compared_in_grey_may_be_a_picture_of_its_own(
 def test_a_density_in_grey_that_nothing_looks_at_is_refused() -> None:
     assert AppearanceConfig(grey_source="density").shows_density
     assert not AppearanceConfig().shows_density
-    with pytest.raises(OptionError, match=r"--appearance\.grey-source"):
+    with pytest.raises(OptionError, match=r"`appearance`\.grey-source"):
         AppearanceConfig(grey=False, grey_source="density")

@@ -100,5 +100,5 @@ def test_descending_the_loss_turns_a_flow_to_its_target() -> None:
     ],
 )
 def test_options_out_of_range_are_named(bad) -> None:
-    with pytest.raises(OptionError, match=f"--motion.{next(iter(bad)).replace('_', '-')} "):
+    with pytest.raises(OptionError, match=f"`motion.{next(iter(bad)).replace('_', '_')}` "):
         dataclasses.replace(CONFIG, **bad)

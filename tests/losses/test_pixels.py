@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 
-from vnca.losses.pixels import luminance, palette_distance, to_yuv
+from vnca.losses.pixels import luma, palette_distance, to_yuv
 
 
 def pixels(count: int, seed: int) -> torch.Tensor:
@@ -56,7 +56,7 @@ def test_grey_keeps_white_and_the_order_of_brightness() -> None:
     picture[0, :, 0, 0] = 1
     for channel in range(3):
         picture[0, channel, 0, 1 + channel] = 1
-    white, red, green, blue = luminance(picture)[0, :, 0].T
+    white, red, green, blue = luma(picture)[0, :, 0].T
     assert white.tolist() == pytest.approx([1, 1, 1])
     assert green[0] > red[0] > blue[0] > 0
     assert red.unique().numel() == 1

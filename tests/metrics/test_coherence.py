@@ -4,9 +4,9 @@ from scipy.ndimage import gaussian_filter
 
 from vnca.core.typing import Box, FloatArray
 from vnca.metrics.coherence import LONG, Coherence, around, disagreement, mean_agreement
-from vnca.metrics.stage import Coloured, Pair, Seen, Sight, Stage
+from vnca.metrics.setup import Coloured, Pair, Seen, Setup, Viewpoint
 
-FRONT = Sight(0, 0)
+FRONT = Viewpoint(0, 0)
 
 
 def picture(seed: int, moved: int = 0) -> Seen:
@@ -98,22 +98,22 @@ def test_colours_in_the_volume_agree_from_side_to_side_and_colours_of_a_view_do_
     density = (np.linalg.norm(at, axis=-1) < 8).astype(np.float32)
     colour = (0.5 + 0.4 * np.sin(at * [0.7, 0.9, 0.8])).astype(np.float32)
     ball = Coloured(density, colour, (0, 0, 0))
-    stage = Stage(Box((0, 0, 0), (20, 20, 20)), gamma=8.0, size=64)
-    sights = [Sight(azimuth, 10) for azimuth in range(0, 360, 30)]
-    fixed = [stage.look_twice(ball, ball, sight) for sight in sights]
-    agreement = around(stage, fixed)
+    setup = Setup(Box((0, 0, 0), (20, 20, 20)), gamma=8.0, size=64)
+    viewpoints = [Viewpoint(azimuth, 10) for azimuth in range(0, 360, 30)]
+    fixed = [setup.look_twice(ball, ball, viewpoint) for viewpoint in viewpoints]
+    agreement = around(setup, fixed)
     assert agreement is not None
     assert agreement.painted < 0.25
     assert agreement.ratio == 1
     wrong = [
         Pair(
-            pair.sight,
+            pair.viewpoint,
             Seen(first.painted.colour, pair.painted.opacity, pair.painted.depth),
             pair.plain,
         )
         for pair, first in zip(fixed, [fixed[0]] * len(fixed), strict=True)
     ]
-    disagreeing = around(stage, wrong)
+    disagreeing = around(setup, wrong)
     assert disagreeing is not None
     assert disagreeing.painted > 1.5 * agreement.painted
 

@@ -8,8 +8,8 @@ from vnca.core.colour import srgb_to_linear
 from vnca.core.typing import FloatArray
 from vnca.features.load import load_network
 from vnca.metrics.judges import Judge
-from vnca.metrics.stage import Pair, Seen, Sight
-from vnca.metrics.style import StyleGauge
+from vnca.metrics.setup import Pair, Seen, Viewpoint
+from vnca.metrics.style import StyleMetric
 
 SIZE = 64
 DISC = np.hypot(*(np.mgrid[:SIZE, :SIZE] - SIZE / 2)) < 24
@@ -33,41 +33,43 @@ def seen(colour: FloatArray, opaque: np.ndarray = DISC) -> Seen:
 
 def pair(colour: FloatArray, opaque: np.ndarray = DISC) -> Pair:
     grey = np.full((SIZE, SIZE, 3), 0.214, np.float32)
-    return Pair(Sight(0.0, 0.0), seen(colour, opaque), seen(grey, opaque))
+    return Pair(Viewpoint(0.0, 0.0), seen(colour, opaque), seen(grey, opaque))
 
 
 @pytest.fixture(scope="module")
-def gauge() -> StyleGauge:
-    return StyleGauge(PICTURE, 96)
+def metric() -> StyleMetric:
+    return StyleMetric(PICTURE, 96)
 
 
 @pytest.fixture(params=["edges", "efficientnet"])
-def judge(request: pytest.FixtureRequest, gauge: StyleGauge) -> Judge:
-    return Judge.of(load_network(request.param), False, gauge, SIZE)
+def judge(request: pytest.FixtureRequest, metric: StyleMetric) -> Judge:
+    return Judge.of(load_network(request.param), False, metric, SIZE)
 
 
 def test_more_of_the_style_closes_the_gap_and_other_colours_do_not(
-    judge: Judge, gauge: StyleGauge
+    judge: Judge, metric: StyleMetric
 ) -> None:
-    judge.look(1, [pair(PICTURE[:SIZE, :SIZE])], gauge)
-    judge.look(2, [pair(painting(1, (0.9, 0.8, 0.2)))], gauge)
-    judge.look(3, [pair(painting(1, (0.2, 0.9, 0.9)))], gauge)
-    judge.look(4, [pair(np.full((SIZE, SIZE, 3), 0.214, np.float32))], gauge)
+    judge.look(1, [pair(PICTURE[:SIZE, :SIZE])], metric)
+    judge.look(2, [pair(painting(1, (0.9, 0.8, 0.2)))], metric)
+    judge.look(3, [pair(painting(1, (0.2, 0.9, 0.9)))], metric)
+    judge.look(4, [pair(np.full((SIZE, SIZE, 3), 0.214, np.float32))], metric)
     assert judge.shares[1] > 0.7
     assert judge.shares[2] > 0.6
     assert judge.shares[3] < judge.shares[2] - 0.2
     assert judge.shares[4] == 0
 
 
-def test_cut_outs_may_be_smaller_than_what_a_network_takes(judge: Judge, gauge: StyleGauge) -> None:
+def test_cut_outs_may_be_smaller_than_what_a_network_takes(
+    judge: Judge, metric: StyleMetric
+) -> None:
     small = np.hypot(*(np.mgrid[:SIZE, :SIZE] - SIZE / 2)) < 8
-    judge.look(1, [pair(painting(1, (0.9, 0.8, 0.2)), small)], gauge)
+    judge.look(1, [pair(painting(1, (0.9, 0.8, 0.2)), small)], metric)
     assert np.isfinite(judge.shares[1])
 
 
-def test_views_without_opaque_smoke_say_nothing(judge: Judge, gauge: StyleGauge) -> None:
-    judge.look(1, [pair(PICTURE[:SIZE, :SIZE], np.zeros_like(DISC))], gauge)
+def test_views_without_opaque_smoke_say_nothing(judge: Judge, metric: StyleMetric) -> None:
+    judge.look(1, [pair(PICTURE[:SIZE, :SIZE], np.zeros_like(DISC))], metric)
     assert not judge.shares
     judge = Judge("imagenet", None, "not installed")
-    judge.look(1, [pair(PICTURE[:SIZE, :SIZE])], gauge)
+    judge.look(1, [pair(PICTURE[:SIZE, :SIZE])], metric)
     assert not judge.shares

@@ -5,7 +5,7 @@ from scipy.ndimage import gaussian_filter
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError, ShapeError
 from vnca.core.typing import BoolArray, FloatArray
-from vnca.metrics.style import StyleDistances, StyleGauge, gap_closed, mean_distances, perceived
+from vnca.metrics.style import StyleDistances, StyleMetric, gap_closed, mean_distances, perceived
 
 SIZE = 96
 DISC: BoolArray = np.hypot(*(np.mgrid[:SIZE, :SIZE] - SIZE / 2)) < 36
@@ -25,54 +25,54 @@ GREY = np.full((SIZE, SIZE, 3), 0.214, np.float32)
 
 
 @pytest.fixture(scope="module")
-def gauge() -> StyleGauge:
-    return StyleGauge(BLOBS, SIZE)
+def metric() -> StyleMetric:
+    return StyleMetric(BLOBS, SIZE)
 
 
 @pytest.fixture(scope="module")
-def cutout(gauge: StyleGauge) -> StyleDistances:
-    return mean_distances(gauge.distances(*part) for part in gauge.cutouts(DISC, 3))
+def cutout(metric: StyleMetric) -> StyleDistances:
+    return mean_distances(metric.distances(*part) for part in metric.cutouts(DISC, 3))
 
 
-def closed(gauge: StyleGauge, cutout: StyleDistances, picture: FloatArray) -> float:
-    plain = gauge.distances(GREY, DISC)
-    return gap_closed(gauge.distances(picture, DISC), plain, cutout)
+def closed(metric: StyleMetric, cutout: StyleDistances, picture: FloatArray) -> float:
+    plain = metric.distances(GREY, DISC)
+    return gap_closed(metric.distances(picture, DISC), plain, cutout)
 
 
-def test_the_picture_itself_closes_the_gap_and_plain_grey_none_of_it(gauge, cutout) -> None:
-    assert gauge.distances(BLOBS, np.ones_like(DISC)) == pytest.approx((0, 0, 0), abs=1e-5)
-    assert closed(gauge, cutout, BLOBS) > 0.9
-    assert closed(gauge, cutout, GREY) == 0
+def test_the_picture_itself_closes_the_gap_and_plain_grey_none_of_it(metric, cutout) -> None:
+    assert metric.distances(BLOBS, np.ones_like(DISC)) == pytest.approx((0, 0, 0), abs=1e-5)
+    assert closed(metric, cutout, BLOBS) > 0.9
+    assert closed(metric, cutout, GREY) == 0
 
 
-def test_another_sample_of_the_style_closes_it_and_other_styles_do_not(gauge, cutout) -> None:
-    assert closed(gauge, cutout, painting(1, 1.5, (0.9, 0.8, 0.2))) > 0.85
-    assert closed(gauge, cutout, painting(1, 1.5, (0.2, 0.9, 0.9))) < 0.6
-    assert closed(gauge, cutout, painting(1, 4.0, (0.9, 0.8, 0.2))) < 0.7
+def test_another_sample_of_the_style_closes_it_and_other_styles_do_not(metric, cutout) -> None:
+    assert closed(metric, cutout, painting(1, 1.5, (0.9, 0.8, 0.2))) > 0.85
+    assert closed(metric, cutout, painting(1, 1.5, (0.2, 0.9, 0.9))) < 0.6
+    assert closed(metric, cutout, painting(1, 4.0, (0.9, 0.8, 0.2))) < 0.7
 
 
-def test_each_measure_sees_what_it_is_for(gauge) -> None:
+def test_each_measure_sees_what_it_is_for(metric) -> None:
     shuffled = np.random.default_rng(0).permutation(BLOBS.reshape(-1, 3)).reshape(BLOBS.shape)
-    scattered = gauge.distances(shuffled, DISC)
+    scattered = metric.distances(shuffled, DISC)
     assert scattered.palette < 0.1
     assert scattered.texture > 0.5
     assert scattered.spectrum > 0.5
-    tinted = gauge.distances(BLOBS[..., ::-1].copy(), DISC)
+    tinted = metric.distances(BLOBS[..., ::-1].copy(), DISC)
     assert tinted.palette > 0.3
     assert tinted.spectrum < 0.3
 
 
-def test_what_lies_outside_the_smoke_is_of_no_effect_on_colour_and_texture(gauge) -> None:
+def test_what_lies_outside_the_smoke_is_of_no_effect_on_colour_and_texture(metric) -> None:
     beside = np.where(DISC[..., None], BLOBS, np.float32(5.0))
-    assert gauge.distances(beside, DISC)[:2] == pytest.approx(gauge.distances(BLOBS, DISC)[:2])
-    spectra = (gauge.distances(picture, DISC).spectrum for picture in (beside, BLOBS))
+    assert metric.distances(beside, DISC)[:2] == pytest.approx(metric.distances(BLOBS, DISC)[:2])
+    spectra = (metric.distances(picture, DISC).spectrum for picture in (beside, BLOBS))
     assert next(spectra) == pytest.approx(next(spectra), abs=1e-5)
 
 
-def test_cutouts_are_parts_of_the_picture_in_the_shape_of_the_smoke(gauge) -> None:
+def test_cutouts_are_parts_of_the_picture_in_the_shape_of_the_smoke(metric) -> None:
     shape = np.zeros((200, 300), bool)
     shape[50:80, 100:110] = shape[70:80, 100:140] = True
-    parts = list(gauge.cutouts(shape, 6))
+    parts = list(metric.cutouts(shape, 6))
     assert len(parts) == 6
     for picture, where in parts:
         assert picture.shape[:2] == where.shape == (30, 40)
@@ -80,14 +80,14 @@ def test_cutouts_are_parts_of_the_picture_in_the_shape_of_the_smoke(gauge) -> No
         assert (picture[..., None, None, :] >= 0).all()
     assert any(not np.array_equal(parts[0][0], picture) for picture, _ in parts)
     # a shape larger than the picture is cut
-    ((picture, where),) = gauge.cutouts(np.ones((500, 40), bool), 1)
+    ((picture, where),) = metric.cutouts(np.ones((500, 40), bool), 1)
     assert picture.shape[:2] == where.shape == (SIZE, 40)
 
 
-def test_a_wisp_is_measured_by_what_can_be_seen_of_it(gauge) -> None:
+def test_a_wisp_is_measured_by_what_can_be_seen_of_it(metric) -> None:
     wisp = np.zeros_like(DISC)
     wisp[40:44, 20:60] = True
-    distances = gauge.distances(BLOBS, wisp)
+    distances = metric.distances(BLOBS, wisp)
     assert distances.texture == 0
     assert np.isfinite(distances).all()
 
@@ -104,7 +104,7 @@ def test_colours_are_those_of_oklab_with_doubled_chroma() -> None:
 )
 def test_what_is_no_style_picture_is_refused(picture, shorter, error) -> None:
     with pytest.raises(error, match="style picture"):
-        StyleGauge(picture, shorter)
+        StyleMetric(picture, shorter)
 
 
 def test_being_nearer_than_the_picture_is_makes_up_for_nothing() -> None:

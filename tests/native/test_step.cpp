@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "crew.hpp"
+#include "thread_pool.hpp"
 #include "step.hpp"
 
 using namespace vnca;
@@ -276,11 +276,11 @@ void test_callers_at_the_same_time() {
 }
 
 void test_an_exception_reaches_the_caller() {
-    Crew& crew = Crew::of_process();
+    ThreadPool& thread_pool = ThreadPool::of_process();
     for (const int threads : THREADS) {
         bool caught = false;
         try {
-            crew.run(100, threads, [](int task, int) {
+            thread_pool.run(100, threads, [](int task, int) {
                 if (task == 40) throw std::runtime_error("task");
             });
         } catch (const std::runtime_error&) {
@@ -288,7 +288,7 @@ void test_an_exception_reaches_the_caller() {
         }
         expect(caught, "an exception of a task is lost");
         std::atomic<int> done = 0;
-        crew.run(100, threads, [&](int, int) { ++done; });
+        thread_pool.run(100, threads, [&](int, int) { ++done; });
         expect(done == 100, "tasks are left out after an exception");
     }
 }

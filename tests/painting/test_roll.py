@@ -170,9 +170,9 @@ def test_reading_ahead_keeps_order_reads_one_ahead_and_passes_errors_on() -> Non
 
 
 def test_options_out_of_range_are_named() -> None:
-    with pytest.raises(OptionError, match="--density-strength"):
+    with pytest.raises(OptionError, match="`density_strength`"):
         StylizeConfig(density_strength=1.5)
-    with pytest.raises(OptionError, match="--steps-per-frame"):
+    with pytest.raises(OptionError, match="`steps_per_frame`"):
         dataclasses.replace(StylizeConfig(), steps_per_frame=-1)
 
 
@@ -195,18 +195,18 @@ def plain_step(state: FloatArray, *_: object) -> FloatArray:
     return state
 
 
-def faint(fringe: int, **options: float) -> Painting:
+def faint(colour_dilation: int, **options: float) -> Painting:
     """A ball of that red in a box of smoke too faint to be painted."""
     density = np.maximum(np.pad(ball(0).density, 6), np.float32(1e-4))
     smoke = Volume(density, None, (0, 0, 0), np.eye(4), 0)
     config = StylizeConfig(warmup=1, **options)  # type: ignore[arg-type]
-    roll = Roll(RULE, config, smoke.box, fringe=fringe)
+    roll = Roll(RULE, config, smoke.box, colour_dilation=colour_dilation)
     with computed_by(plain_step):
         return roll.paint(smoke, roll.start())
 
 
 def test_faint_smoke_has_the_colour_of_the_painting_beside_it_and_is_white_farther_away() -> None:
-    painting = faint(fringe=3)
+    painting = faint(colour_dilation=3)
     red = srgb_to_linear(np.array([0.4, 0.1, 0.0]))
     lived = np.zeros(painting.density.shape, bool)
     lived[tuple(painting.state.cells.T)] = True
@@ -223,9 +223,9 @@ def test_faint_smoke_has_the_colour_of_the_painting_beside_it_and_is_white_farth
 
 
 def test_a_fringe_fades_with_the_painting() -> None:
-    half, full = faint(fringe=2, strength=0.5), faint(fringe=2)
+    half, full = faint(colour_dilation=2, strength=0.5), faint(colour_dilation=2)
     np.testing.assert_allclose(half.colour, 0.5 + 0.5 * full.colour, rtol=1e-6)
-    np.testing.assert_array_equal(faint(fringe=2, strength=0.0).colour, 1)
+    np.testing.assert_array_equal(faint(colour_dilation=2, strength=0.0).colour, 1)
 
 
 def test_cells_of_the_whole_box_live_on_however_far_the_smoke_jumps() -> None:

@@ -16,9 +16,9 @@ def test_a_cell_of_even_smoke_is_as_opaque_as_asked(opacity: float) -> None:
 
 def test_faint_fringes_and_units_do_not_change_the_picture() -> None:
     core = np.full(100, 2.0)
-    fringe = np.full(10_000, 1e-4)
+    faint = np.full(10_000, 1e-4)
     alone = gamma_for_cell_opacity(core, 0.9)
-    assert gamma_for_cell_opacity(np.append(core, fringe), 0.9) == pytest.approx(alone, rel=0.01)
+    assert gamma_for_cell_opacity(np.append(core, faint), 0.9) == pytest.approx(alone, rel=0.01)
     assert gamma_for_cell_opacity(10 * core, 0.9) == pytest.approx(alone / 10)
 
 

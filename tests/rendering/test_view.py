@@ -182,7 +182,7 @@ def test_large_pictures_are_marched_in_groups_without_a_seam(monkeypatch) -> Non
     torch.testing.assert_close(whole.rgba, parts.rgba)
 
 
-@pytest.mark.parametrize("mode", ["sane", "paper"])
+@pytest.mark.parametrize("mode", ["emission-absorption", "paper"])
 def test_render_gradients_match_finite_differences(mode) -> None:
     generator = torch.Generator().manual_seed(0)
     density = 0.1 + torch.rand(3, 2, 3, dtype=torch.float64, generator=generator)

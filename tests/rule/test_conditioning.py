@@ -7,7 +7,7 @@ from vnca.core.lattice import Lattice, Region
 from vnca.core.typing import Box
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
-from vnca.rule.conditioning import priors, told_velocity
+from vnca.rule.conditioning import normalised_velocity, priors
 from vnca.rule.paint import colours, density_factors
 from vnca.rule.rule import Rule, RuleConfig, Scales
 
@@ -121,7 +121,7 @@ def test_a_density_in_other_units_cannot_blow_a_state_up() -> None:
 
 def test_fast_smoke_is_told_where_it_goes_and_no_speed_beyond_the_limit() -> None:
     velocity = np.array([[0, 0, 0], [3, 0, 0], [0, -4, 0], [30, 0, -40], [3e9, 4e9, 0]], np.float32)
-    told = told_velocity(velocity, rule())
+    told = normalised_velocity(velocity, rule())
     expected = [[0, 0, 0], [1.5, 0, 0], [0, -2, 0], [1.2, 0, -1.6], [1.2, 1.6, 0]]
     np.testing.assert_allclose(told, expected, rtol=1e-6)
     assert told.dtype == np.float32
@@ -129,7 +129,7 @@ def test_fast_smoke_is_told_where_it_goes_and_no_speed_beyond_the_limit() -> Non
 
 def test_a_velocity_as_large_as_a_file_can_hold_is_told_as_any_other() -> None:
     huge = np.array([[3e38, 0, 0], [0, -1e25, 0]], np.float32)
-    told = told_velocity(huge, rule())
+    told = normalised_velocity(huge, rule())
     np.testing.assert_allclose(told, [[2, 0, 0], [0, -2, 0]], rtol=1e-6)
 
 

@@ -80,7 +80,7 @@ def test_uvs_that_are_all_one_point_are_replaced(name: str) -> None:
     atlas = unwrapped(mesh, "auto", size=128)
     assert atlas.fault == "they cover 0.00% of the texture"
     assert len(atlas.texels.texel) > 0.4 * 128**2
-    with pytest.raises(GridError, match=r"0\.00% of the texture\); --unwrap always"):
+    with pytest.raises(GridError, match=r"0\.00% of the texture\); `unwrap` always"):
         unwrapped(mesh, "never", size=128)
 
 

@@ -34,7 +34,7 @@ def test_the_block_repeats_as_often_as_asked_along_the_longest_side(ball: Mesh) 
     for scale in (0.5, 1.0, 3.0):
         place = Placement.of(ball, size=16, scale=scale)
         np.testing.assert_allclose(np.ptp(place(np.stack([low, high])), 0).max(), 16 * scale)
-    with pytest.raises(OptionError, match="--scale"):
+    with pytest.raises(OptionError, match="`scale`"):
         Placement.of(ball, size=16, scale=0)
 
 

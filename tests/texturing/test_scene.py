@@ -22,7 +22,7 @@ def state_of(scene: BlockScene) -> torch.Tensor:
 def seen(
     scene: BlockScene, state: torch.Tensor, random: np.random.Generator
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    return scene.pictures(state, scene.sight(random), BACKGROUND)
+    return scene.pictures(state, scene.viewpoint(random), BACKGROUND)
 
 
 def test_cells_are_told_nothing_and_see_across_the_border() -> None:

@@ -10,7 +10,7 @@ from vnca.features.vgg import VGG16
 from vnca.io.picture import fit, read_image
 from vnca.losses.appearance import AppearanceConfig
 from vnca.rule.rule import RuleConfig
-from vnca.training.smoke_config import TrainConfig, ViewConfig
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 
 @pytest.fixture(scope="session")
@@ -27,8 +27,8 @@ def style(tmp_path_factory: pytest.TempPathFactory) -> FloatArray:
 
 
 @pytest.fixture(scope="session")
-def tiny_config() -> TrainConfig:
-    return TrainConfig(
+def tiny_config() -> SmokeConfig:
+    return SmokeConfig(
         rule=RuleConfig(channels=6, hidden=16, position_prior=False),
         view=ViewConfig(size=32),
         appearance=AppearanceConfig(

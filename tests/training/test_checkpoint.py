@@ -18,7 +18,7 @@ from vnca.losses.motion import MotionConfig
 from vnca.training.checkpoint import Checkpoint, Thrift, fingerprints
 from vnca.training.loop import Trainer
 from vnca.training.scenes.smoke import SmokeScene
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 
 Make = Callable[..., Trainer]
@@ -27,7 +27,7 @@ INPUTS = {"frame": "a", "options": "b"}
 
 
 @pytest.fixture
-def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16) -> Make:
+def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16) -> Make:
     """Makes a trainer of the tiny training with some options changed."""
 
     def make(**options: Any) -> Trainer:
@@ -120,7 +120,7 @@ def test_what_changed_since_is_told(trainer: Make, tmp_path: Path) -> None:
 
 
 def test_every_input_has_a_fingerprint_of_its_own(
-    tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
+    tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16
 ) -> None:
     frame = [tiny_smoke.density, tiny_smoke.origin, tiny_smoke.velocity]
     own = fingerprints(style, tiny_config, vgg, frame=frame)
@@ -149,7 +149,7 @@ def test_every_input_has_a_fingerprint_of_its_own(
 def written(
     tiny_smoke: Volume,
     style: FloatArray,
-    tiny_config: TrainConfig,
+    tiny_config: SmokeConfig,
     vgg: VGG16,
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Path:
@@ -201,7 +201,7 @@ WEIGHT, STATE = "descent.now.0.weight", "pool.0"
         lambda t, d: d["values"]["trainer"].update(random={"bit_generator": "MT19937"}),
         lambda t, d: d["values"]["trainer"]["random"].update(state={"state": -1, "inc": 1}),
         lambda t, d: d["values"]["trainer"]["random"].update(state={"state": "", "inc": 1}),
-        lambda t, d: d["values"]["descent"].update(retreats=5),
+        lambda t, d: d["values"]["descent"].update(rollbacks=5),
         lambda t, d: d["values"]["descent"].update(kept_at=None),
         lambda t, d: t.pop(WEIGHT),
         lambda t, d: t.update({WEIGHT: t[WEIGHT][:-1]}),
@@ -218,7 +218,7 @@ WEIGHT, STATE = "descent.now.0.weight", "pool.0"
     ],
 )
 def test_a_damaged_checkpoint_is_refused_by_its_name(
-    trainer: Make, damaged: Callable[[Change], Path], change: Change, tiny_config: TrainConfig
+    trainer: Make, damaged: Callable[[Change], Path], change: Change, tiny_config: SmokeConfig
 ) -> None:
     path = damaged(change)
     with pytest.raises(FileFormatError, match=r"damaged\.safetensors"):

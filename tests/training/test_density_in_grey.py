@@ -13,23 +13,23 @@ from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
 from vnca.losses.pixels import luminance
 from vnca.rule.rule import DENSITY_CHANGE, Rule, RuleConfig
-from vnca.training.scenes.smoke import SmokeScene, SmokeSight
-from vnca.training.smoke_config import TrainConfig, ViewConfig
+from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 from vnca.training.smoke_trainer import choose_scales, smoke_trainer
 
 GREY = torch.tensor([0.2, 0.3, 0.1])
 SMALL = AppearanceConfig(layers=("relu1_1", "relu2_1", "relu3_1"), samples=128)
 
 
-@pytest.fixture(params=["sane", "paper"])
+@pytest.fixture(params=["emission-absorption", "paper"])
 def scene(request: pytest.FixtureRequest, tiny_smoke: Volume) -> SmokeScene:
     view = ViewConfig(size=32, mode=request.param)
-    scales = choose_scales(tiny_smoke, TrainConfig(view=view))
+    scales = choose_scales(tiny_smoke, SmokeConfig(view=view))
     return SmokeScene(tiny_smoke, Rule.initial(RuleConfig(channels=5), scales, seed=0), view)
 
 
-def front(scene: SmokeScene) -> SmokeSight:
-    return SmokeSight(scene.camera(0, 0), 0.0)
+def front(scene: SmokeScene) -> SmokeViewpoint:
+    return SmokeViewpoint(scene.camera(0, 0), 0.0)
 
 
 def test_smoke_as_it_is_looks_about_white(scene: SmokeScene) -> None:
@@ -83,7 +83,7 @@ def test_colour_alone_satisfies_luma_and_density_alone_the_density(
     tiny_smoke: Volume, style: FloatArray, vgg: VGG16
 ) -> None:
     view = ViewConfig(size=32)
-    scales = choose_scales(tiny_smoke, TrainConfig(view=view))
+    scales = choose_scales(tiny_smoke, SmokeConfig(view=view))
     scene = SmokeScene(tiny_smoke, Rule.initial(RuleConfig(channels=5), scales, seed=0), view)
     loss = AppearanceLoss(vgg, style, replace(SMALL, colour=False, pixels=0.0), 32)
     colour, density = slice(0, 3), slice(3, 4)
@@ -100,7 +100,7 @@ def test_colour_alone_satisfies_luma_and_density_alone_the_density(
 
 
 def test_a_training_with_it_teaches_other_weights_and_is_repeatable(
-    tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
+    tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16
 ) -> None:
     def weights(source: str) -> FloatArray:
         appearance = replace(tiny_config.appearance, grey_source=source)  # type: ignore[arg-type]

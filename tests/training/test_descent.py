@@ -10,9 +10,9 @@ from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import Appearance, AppearanceLoss
-from vnca.training.descent import KEEP_EVERY, MOST_RETREATS, PATIENCE, Descent
+from vnca.training.descent import KEEP_EVERY, MOST_ROLLBACKS, PATIENCE, Descent
 from vnca.training.loop import Trainer
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 
 NAN = torch.tensor(torch.nan)
@@ -77,7 +77,7 @@ def test_a_state_that_explodes_now_and_then_is_none_of_its_business() -> None:
         assert slope.step(NAN, exploded=True)
         assert slope.weight.item() == before
         assert slope.step()
-    assert slope.descent.retreats == 0
+    assert slope.descent.rollbacks == 0
 
 
 def test_states_that_explode_one_after_the_other_lead_back() -> None:
@@ -108,11 +108,11 @@ def test_a_restored_descent_goes_on_as_the_first_does() -> None:
         slope.step(NAN)
         slope.step()
     assert one.visited[-6:] == two.visited[-6:]
-    assert one.descent.retreats == two.descent.retreats == 2
+    assert one.descent.rollbacks == two.descent.rollbacks == 2
 
 
 @pytest.fixture
-def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16) -> Trainer:
+def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16) -> Trainer:
     return smoke_trainer(tiny_smoke, style, replace(tiny_config, iterations=20), vgg)
 
 
@@ -131,17 +131,17 @@ def test_training_gives_up_after_three_lower_rates_with_the_last_good_weights(
     assert not any(step.diverged for step in islice(training, good))
     kept = trainer.rule()
     assert not next(training).diverged
-    for times in range(1, MOST_RETREATS + 2):
+    for times in range(1, MOST_ROLLBACKS + 2):
         assert next(training).diverged
         assert trainer.learning_rate == trainer.config.rate(trainer.iteration) / 2**times
-    with pytest.raises(DivergenceError, match=r"4 times.*iteration 10 are kept.*--learning-rate"):
+    with pytest.raises(DivergenceError, match=r"4 times.*iteration 10 are kept.*`learning_rate`"):
         next(training)
     np.testing.assert_array_equal(trainer.rule().output, kept.output)
-    assert MOST_RETREATS == 3
+    assert MOST_ROLLBACKS == 3
 
 
 def test_an_absurd_learning_rate_is_lowered_until_states_stay_whole(
-    tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
+    tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16
 ) -> None:
     config = replace(
         tiny_config, iterations=PATIENCE + 5, learning_rate=50, shortest_rollout=8,

@@ -15,14 +15,14 @@ from vnca.training.config import PoolConfig
 from vnca.training.loop import Trainer
 from vnca.training.preview import preview_sheet
 from vnca.training.scene import Scene
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 
 Make = Callable[..., Trainer]
 
 
 @pytest.fixture
-def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16) -> Make:
+def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16) -> Make:
     """Makes a trainer of the tiny training with some options changed."""
     return lambda **options: smoke_trainer(tiny_smoke, style, replace(tiny_config, **options), vgg)
 
@@ -189,7 +189,7 @@ def test_states_that_are_computed_again_change_nothing(trainer: Make, backend: s
 
 
 def test_smoke_of_any_units_gives_the_same_rule(
-    tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
+    tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16
 ) -> None:
     assert tiny_smoke.velocity is not None
     other = replace(tiny_smoke, density=64 * tiny_smoke.density, velocity=8 * tiny_smoke.velocity)
@@ -200,9 +200,9 @@ def test_smoke_of_any_units_gives_the_same_rule(
         np.testing.assert_allclose(ours, theirs, atol=1e-3)
 
 
-@pytest.mark.parametrize("mode", ["sane", "paper"])
+@pytest.mark.parametrize("mode", ["emission-absorption", "paper"])
 def test_smoke_without_velocity_trains_with_either_integrand(
-    tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16, mode: str
+    tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16, mode: str
 ) -> None:
     config = replace(tiny_config, view=replace(tiny_config.view, mode=mode))  # type: ignore[arg-type]
     training = smoke_trainer(replace(tiny_smoke, velocity=None), style, config, vgg)

@@ -20,7 +20,7 @@ from vnca.training.memory import (
 )
 from vnca.training.rollout import fewest_kept
 from vnca.training.scenes.smoke import SmokeScene
-from vnca.training.smoke_config import PRESETS, TrainConfig, ViewConfig
+from vnca.training.smoke_config import PRESETS, SmokeConfig, ViewConfig
 
 CPU = torch.device("cpu")
 MANY = replace(PRESETS["draft"], longest_rollout=64, view=ViewConfig(size=32))
@@ -87,7 +87,7 @@ def test_budgets_are_sizes(text: str, bytes_: float | None) -> None:
 
 @pytest.mark.parametrize("text", ["", "12", "GB", "-1GB", "12 apples", "1e3GB", "nanGB"])
 def test_what_is_no_size_is_refused(text: str) -> None:
-    with pytest.raises(OptionError, match=f"--memory-budget {text}: expected auto"):
+    with pytest.raises(OptionError, match=f"`memory_budget` {text}: expected auto"):
         memory_budget(text)
 
 
@@ -111,7 +111,7 @@ def test_a_smaller_budget_keeps_fewer_states_and_too_small_a_one_is_told_the_lea
     scene: SmokeScene, memory: dict[str, float]
 ) -> None:
     memory["used"] = 0
-    with pytest.raises(OptionError, match=r"--memory-budget 1 MB: at least \d+ MB are") as refused:
+    with pytest.raises(OptionError, match=r"`memory_budget` 1 MB: at least \d+ MB are") as refused:
         states_to_keep(scene, MANY, int(1e6))
     assert "--pool.size 16 about 1 MB" in str(refused.value)
     found = re.search(r"at least (\d+) MB", str(refused.value))
@@ -137,6 +137,6 @@ def test_this_program_has_memory_and_there_is_some_left() -> None:
 
 
 def test_the_largest_preset_fits_where_its_pool_does(scene: SmokeScene) -> None:
-    paper: TrainConfig = PRESETS["paper"]
+    paper: SmokeConfig = PRESETS["paper"]
     needs = memory_needs(scene, paper)
     assert fewest_kept(paper.longest_rollout) * needs.state < needs.pool

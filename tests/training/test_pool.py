@@ -20,9 +20,9 @@ def test_every_state_starts_as_the_seed() -> None:
 
 def test_a_state_that_was_returned_is_drawn_again_without_its_gradient() -> None:
     states = pool(size=1)
-    place, _ = states.draw(1)
+    slot, _ = states.draw(1)
     grown = torch.full_like(SEED, 0.5, requires_grad=True)
-    assert states.put(place, grown * 2)
+    assert states.put(slot, grown * 2)
     _, again = states.draw(2)
     assert torch.equal(again, torch.ones_like(SEED))
     assert not again.requires_grad
@@ -30,10 +30,10 @@ def test_a_state_that_was_returned_is_drawn_again_without_its_gradient() -> None
 
 def test_places_do_not_share_a_state() -> None:
     states = pool(size=8)
-    place, _ = states.draw(1)
-    states.put(place, torch.ones_like(SEED))
+    slot, _ = states.draw(1)
+    states.put(slot, torch.ones_like(SEED))
     for other, state in (states.draw(2) for _ in range(50)):
-        assert torch.equal(state, torch.ones_like(SEED) if other == place else SEED)
+        assert torch.equal(state, torch.ones_like(SEED) if other == slot else SEED)
 
 
 def test_every_so_many_iterations_the_seed_is_drawn_and_its_old_state_forgotten() -> None:

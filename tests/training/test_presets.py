@@ -13,7 +13,7 @@ from vnca.losses.appearance import AppearanceLoss
 from vnca.rendering.colour import linear_to_srgb
 from vnca.rule.rule import Rule
 from vnca.training.scenes.smoke import SmokeScene
-from vnca.training.smoke_config import PRESETS, TrainConfig
+from vnca.training.smoke_config import PRESETS, SmokeConfig
 from vnca.training.smoke_trainer import choose_scales, smoke_trainer
 
 GREY = 0.214
@@ -21,7 +21,7 @@ GREY = 0.214
 AROUND = (0.0, 90.0, 180.0, 270.0)
 
 
-def small(preset: TrainConfig) -> TrainConfig:
+def small(preset: SmokeConfig) -> SmokeConfig:
     """The preset, so small that it takes a second."""
     layers = ("relu1_1", "relu2_1", "relu3_1")
     return replace(

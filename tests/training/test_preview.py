@@ -4,21 +4,21 @@ from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.training.preview import SIZE, preview_sheet
-from vnca.training.scenes.smoke import PORTRAITS
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.scenes.smoke import PREVIEW_VIEWS
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 
 
 def test_a_preview_shows_the_style_and_every_view(
-    tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
+    tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16
 ) -> None:
     sheet = preview_sheet(smoke_trainer(tiny_smoke, style, tiny_config, vgg), style)
     rows, columns, channels = sheet.shape
     assert rows >= SIZE
-    assert columns >= SIZE * (1 + len(PORTRAITS))
+    assert columns >= SIZE * (1 + len(PREVIEW_VIEWS))
     assert channels == 3
     assert np.isfinite(sheet).all()
     assert sheet.min() >= 0
     assert sheet.max() <= 1
-    parts = np.array_split(sheet, 1 + len(PORTRAITS), axis=1)
+    parts = np.array_split(sheet, 1 + len(PREVIEW_VIEWS), axis=1)
     assert all(part.std() > 0.01 for part in parts)

@@ -9,7 +9,7 @@ from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule, RuleConfig, Scales
 from vnca.training.loop import Progress
 from vnca.training.run import RunFolder
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 
 MODEL = Model(Rule.initial(RuleConfig(channels=4, hidden=2), Scales(), seed=0))
 
@@ -21,7 +21,7 @@ def test_choosing_a_folder_leaves_no_trace(tmp_path: Path) -> None:
 
 def test_a_run_folder_holds_configuration_model_preview_and_curves(tmp_path: Path) -> None:
     with RunFolder(tmp_path / "run") as folder:
-        folder.start(TrainConfig(seed=3), {"style": "night.png"})
+        folder.start(SmokeConfig(seed=3), {"style": "night.png"})
         folder.log(Progress(1, 5.0, {"style": 4.0, "overflow": 1.0}, exploded=False), 1e-3)
         folder.preview(np.full((4, 6, 3), 0.5, np.float32), 1)
         folder.save(MODEL)
@@ -31,7 +31,7 @@ def test_a_run_folder_holds_configuration_model_preview_and_curves(tmp_path: Pat
     resolved = json.loads((folder.path / "config.json").read_text())
     assert resolved["style"] == "night.png"
     assert resolved["config"]["seed"] == 3
-    assert resolved["config"]["view"]["size"] == TrainConfig().view.size
+    assert resolved["config"]["view"]["size"] == SmokeConfig().view.size
     assert Model.load(folder.path).rule.config == MODEL.rule.config
 
 
@@ -54,7 +54,7 @@ def test_loss_curves_can_be_read_again(tmp_path: Path) -> None:
 
 def test_an_earlier_model_is_kept_unless_it_may_be_overwritten(tmp_path: Path) -> None:
     MODEL.save(tmp_path / MODEL_NAME)
-    with pytest.raises(OutputError, match="--overwrite"):
+    with pytest.raises(OutputError, match="`overwrite`"):
         RunFolder(tmp_path)
     (tmp_path / "preview_000300.png").write_bytes(b"old")
     (tmp_path / "events.out.tfevents.1").write_bytes(b"old")

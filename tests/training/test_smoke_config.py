@@ -6,21 +6,21 @@ import pytest
 
 from vnca.core.errors import OptionError
 from vnca.training.config import PoolConfig
-from vnca.training.smoke_config import PRESETS, TrainConfig, ViewConfig
+from vnca.training.smoke_config import PRESETS, SmokeConfig, ViewConfig
 
 
 @pytest.mark.parametrize(
     ("config", "option", "value"),
     [
-        (TrainConfig, "iterations", 0),
-        (TrainConfig, "learning_rate", 0.0),
-        (TrainConfig, "learning_rate", math.nan),
-        (TrainConfig, "decay", math.inf),
-        (TrainConfig, "milestones", (100.0, 200.0)),
-        (TrainConfig, "shortest_rollout", 0),
-        (TrainConfig, "overflow", math.nan),
-        (TrainConfig, "seed", -1),
-        (TrainConfig, "seed", 2**64),
+        (SmokeConfig, "iterations", 0),
+        (SmokeConfig, "learning_rate", 0.0),
+        (SmokeConfig, "learning_rate", math.nan),
+        (SmokeConfig, "decay", math.inf),
+        (SmokeConfig, "milestones", (100.0, 200.0)),
+        (SmokeConfig, "shortest_rollout", 0),
+        (SmokeConfig, "overflow", math.nan),
+        (SmokeConfig, "seed", -1),
+        (SmokeConfig, "seed", 2**64),
         (ViewConfig, "size", 31),
         (ViewConfig, "azimuths", (0.0, 361.0)),
         (ViewConfig, "azimuths", (math.nan,)),
@@ -41,8 +41,8 @@ def test_values_that_cannot_work_are_refused_by_the_name_of_their_option(
 
 
 def test_a_rollout_is_not_shorter_than_its_shortest() -> None:
-    with pytest.raises(OptionError, match="--longest-rollout"):
-        TrainConfig(shortest_rollout=9, longest_rollout=8)
+    with pytest.raises(OptionError, match="`longest_rollout`"):
+        SmokeConfig(shortest_rollout=9, longest_rollout=8)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -58,7 +58,7 @@ def test_the_paper_preset_is_the_papers() -> None:
 
 
 def test_the_learning_rate_rises_to_its_height_and_falls_at_each_milestone() -> None:
-    config = TrainConfig(
+    config = SmokeConfig(
         iterations=10, learning_rate=0.8, rate_warmup=3, milestones=(0.5, 0.8), decay=0.5
     )
     rates = [config.rate(iteration) for iteration in range(10)]

@@ -13,7 +13,7 @@ from vnca.engine.domain import DomainKind
 from vnca.features.vgg import VGG16
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import stylize
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 
 
@@ -22,7 +22,7 @@ from vnca.training.smoke_trainer import smoke_trainer
 def test_the_frame_of_the_training_has_the_same_priors_in_a_painting(
     tiny_smoke: Volume,
     style: FloatArray,
-    tiny_config: TrainConfig,
+    tiny_config: SmokeConfig,
     vgg: VGG16,
     kind: DomainKind,
     shift: int,
@@ -55,7 +55,7 @@ def test_the_frame_of_the_training_has_the_same_priors_in_a_painting(
 
 
 def test_a_frame_of_sheared_cells_is_not_trained_on(
-    tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
+    tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16
 ) -> None:
     matrix = tiny_smoke.index_to_world.copy()
     matrix[0, 2] = 0.05

@@ -86,10 +86,10 @@ def require(name: str, dtype: str, device: str) -> None:
         OptionError: If there is none of that name.
     """
     if name not in BACKENDS:
-        raise OptionError(f"--backends {name}: expected {', '.join(BACKENDS)}")
+        raise OptionError(f"`backends` {name}: expected {', '.join(BACKENDS)}")
     reason = _why_not(name, dtype, device)
     if reason is not None:
-        raise BackendUnavailableError(f"--backends {name}: {reason}")
+        raise BackendUnavailableError(f"`backends` {name}: {reason}")
 
 
 def _why_not(name: str, dtype: str, device: str) -> str | None:

@@ -64,19 +64,19 @@ class StepConfig:
 
     def __post_init__(self) -> None:
         if min(self.grid) < 1:
-            raise OptionError(f"--grid {'x'.join(map(str, self.grid))}: at least 1x1x1 is needed")
+            raise OptionError(f"`grid` {'x'.join(map(str, self.grid))}: at least 1x1x1 is needed")
         for name in ("hidden", "threads", "repeats"):
             if getattr(self, name) < 1:
-                raise OptionError(f"--{name} {getattr(self, name)}: at least 1 is needed")
+                raise OptionError(f"`{name}` {getattr(self, name)}: at least 1 is needed")
         if not 0 < self.occupancy <= 1:
-            raise OptionError(f"--occupancy {self.occupancy}: must be over 0 and at most 1")
+            raise OptionError(f"`occupancy` {self.occupancy}: must be over 0 and at most 1")
         for name, known in (("passes", PASSES), ("dtypes", DTYPES)):
             chosen = getattr(self, name)
             if not chosen or not set(chosen) <= set(known):
-                raise OptionError(f"--{name} {','.join(chosen)}: expected of {', '.join(known)}")
+                raise OptionError(f"`{name}` {','.join(chosen)}: expected of {', '.join(known)}")
         for name in {"tf32", "float16"}.intersection(self.dtypes):
             if self.device == "cpu":
-                raise OptionError(f"--dtypes {name}: is of GPUs; expected float32 or bfloat16 here")
+                raise OptionError(f"`dtypes` {name}: is of GPUs; expected float32 or bfloat16 here")
 
 
 class Entry(NamedTuple):
@@ -132,7 +132,7 @@ def prepare(config: StepConfig) -> dict[str, str | int]:
         OptionError: If there is none of that name, or no GPU.
     """
     if config.device == "cuda" and not torch.cuda.is_available():
-        raise OptionError("--device cuda: torch finds no NVIDIA GPU; use cpu")
+        raise OptionError("`device` cuda: torch finds no NVIDIA GPU; use cpu")
     for dtype in config.dtypes:
         for name in config.backends:
             require(name, dtype, config.device)
@@ -149,7 +149,7 @@ def take_part(case: Case, config: StepConfig, dtype: str) -> list[Entry]:
     """
     if not len(case.rows):
         raise OptionError(
-            f"--grid {'x'.join(map(str, config.grid))}: no cell of it changes; take a larger one"
+            f"`grid` {'x'.join(map(str, config.grid))}: no cell of it changes; take a larger one"
         )
     _set_tf32(dtype)
     place = Place(config.device, DTYPES[dtype])

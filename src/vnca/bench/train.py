@@ -22,7 +22,7 @@ from vnca.core.volume import Volume
 from vnca.engine.session import StepSession
 from vnca.features.network import FeatureNetwork
 from vnca.training.loop import Trainer
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 
 PLAIN = ("plain", "compile")
@@ -50,7 +50,7 @@ class Training:
 
     smoke: Volume
     style: FloatArray
-    config: TrainConfig
+    config: SmokeConfig
     network: FeatureNetwork
     device: torch.device
     memory_budget: int | None = None

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 import vnca
-from vnca.cli.progress import end_line
+from vnca.cli.progress import as_options, end_line
 from vnca.cli.subcommands import usage
 from vnca.cli.termination import terminable
 from vnca.core.errors import Terminated, VncaError
@@ -75,5 +75,5 @@ def _call(arguments: Sequence[str]) -> int:
 def _failed(message: str) -> int:
     end_line()
     # What a library says of a damaged file may have several lines.
-    print("vnca:", " ".join(message.split()), file=sys.stderr)
+    print("vnca:", as_options(" ".join(message.split())), file=sys.stderr)
     return 2

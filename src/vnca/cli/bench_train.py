@@ -26,7 +26,7 @@ from vnca.io.picture import read_style
 from vnca.io.smoke import SmokeFormat
 from vnca.simulation.scenes import simulate
 from vnca.training.memory import memory_budget
-from vnca.training.smoke_config import PRESETS, TrainConfig
+from vnca.training.smoke_config import PRESETS, SmokeConfig
 
 _FRAME = 30
 """Of the simulated plume: it has risen through most of its box."""
@@ -75,7 +75,7 @@ class BenchTrain(Tables):
                 raise OptionError(f"--{name} {value}: at least 1 is needed")
 
     @property
-    def config(self) -> TrainConfig:
+    def config(self) -> SmokeConfig:
         """The hyperparameters."""
         preset = PRESETS[self.preset]
         rollout = self.rollout or (preset.shortest_rollout + preset.longest_rollout) // 2

@@ -16,7 +16,7 @@ from vnca.cli.train import Train, train
 from vnca.core.typing import FloatArray
 from vnca.io.picture import fit, read_style, write_image
 from vnca.io.sheet import contact_sheet
-from vnca.training.smoke_config import PRESETS, TrainConfig
+from vnca.training.smoke_config import PRESETS, SmokeConfig
 
 STYLE = "vangogh_cafe_terrace.webp"
 """A painting in the package, in the public domain."""
@@ -81,7 +81,7 @@ def demonstrate(options: Demo) -> None:
     print(f"film:          {film}\ncontact sheet: {sheet}")
 
 
-def _config(options: Demo) -> TrainConfig:
+def _config(options: Demo) -> SmokeConfig:
     config = replace(PRESETS["draft"], seed=options.seed)
     if not options.quick:
         return config

@@ -28,8 +28,8 @@ from vnca.io.smoke_format import NO_VELOCITY
 from vnca.metrics.judges import Judge
 from vnca.metrics.measures import Measure, measures
 from vnca.metrics.report import report
-from vnca.metrics.stage import SIZE, Stage
-from vnca.metrics.style import SMALLEST, StyleGauge
+from vnca.metrics.setup import SIZE, Setup
+from vnca.metrics.style import SMALLEST, StyleMetric
 from vnca.metrics.survey import survey
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import stylize
@@ -117,8 +117,8 @@ def evaluate(options: Evaluate, model: Model) -> None:
     still = dataclasses.replace(smoke, velocity_grid=NO_VELOCITY)
     shapes = volumes(sequence, still, lattice)
     refine = options.refine
-    stage = Stage.around(shapes, rule, options.size).refined(refine)
-    gauge = StyleGauge(picture, _checked_size(width(stage), f"--size {options.size}"))
+    setup = Setup.around(shapes, rule, options.size).refined(refine)
+    metric = StyleMetric(picture, _checked_size(width(setup), f"--size {options.size}"))
     paintings = stylize(
         volumes(sequence, smoke, lattice),
         rule,
@@ -128,8 +128,8 @@ def evaluate(options: Evaluate, model: Model) -> None:
         compute=Compute(options.backend),
     )
     tracking = tracked(paintings, "painting and measuring", len(sequence), "frames")
-    judges = _judges(model, gauge, options.size)
-    found = survey(tracking, len(sequence), rule.refined(refine), stage, gauge, judges)
+    judges = _judges(model, metric, options.size)
+    found = survey(tracking, len(sequence), rule.refined(refine), setup, metric, judges)
     facts = {
         "title": f"{folder.resolve().name} on {sequence[0].path.resolve().parent.name}",
         "picture": str(model.training.get("style", options.style)),
@@ -154,7 +154,7 @@ def evaluate(options: Evaluate, model: Model) -> None:
     say(f"report: {out / REPORT_NAME}")
 
 
-def _judges(model: Model, gauge: StyleGauge, size: int) -> list[Judge]:
+def _judges(model: Model, metric: StyleMetric, size: int) -> list[Judge]:
     """The networks, each with whether the rule was trained with it; those not installed say so."""
     found = []
     for name in JUDGES:
@@ -165,7 +165,7 @@ def _judges(model: Model, gauge: StyleGauge, size: int) -> list[Judge]:
             found.append(Judge(name, model.training.get("features") == name, str(error)))
             continue
         trained_with = None if origin is None else origin == network.origin
-        found.append(Judge.of(network, trained_with, gauge, size))
+        found.append(Judge.of(network, trained_with, metric, size))
     return found
 
 
@@ -194,8 +194,8 @@ def _picture(options: Evaluate, model: Model, folder: Path) -> FloatArray:
         return read_image(path)
 
 
-def _compared_width(options: Evaluate, model: Model) -> Callable[[Stage], float]:
-    """Pixels along the picture's shorter side on a stage: as many cells as the rule was shown."""
+def _compared_width(options: Evaluate, model: Model) -> Callable[[Setup], float]:
+    """Pixels along the picture's shorter side on a setup: as many cells as the rule was shown."""
     if options.style_scale is not None:
         pixels = options.size * options.style_scale
         return lambda _: pixels
@@ -204,7 +204,7 @@ def _compared_width(options: Evaluate, model: Model) -> Callable[[Stage], float]
         raise OptionError(
             f"{options.run}: does not tell how many cells wide its picture was; set --style-scale"
         )
-    return lambda stage: cells * stage.scale
+    return lambda setup: cells * setup.scale
 
 
 def _checked_size(pixels: float, option: str) -> int:

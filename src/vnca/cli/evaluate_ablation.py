@@ -32,7 +32,7 @@ from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule
 from vnca.training.checkpoint import CHECKPOINT_NAME
 from vnca.training.run import CONFIG_NAME
-from vnca.training.smoke_config import PRESETS, TrainConfig
+from vnca.training.smoke_config import PRESETS, SmokeConfig
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Ablation:
     """Where to train: auto, cpu or cuda."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
-    config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=TrainConfig)
+    config: Annotated[SmokeConfig, tyro.conf.arg(name="")] = field(default_factory=SmokeConfig)
     """Hyperparameters."""
 
     def __post_init__(self) -> None:
@@ -75,7 +75,7 @@ def run(arguments: Sequence[str]) -> None:
     missing: Any = tyro.MISSING
     preset = chosen(arguments, "--preset", "draft")
     defaults = Ablation(
-        missing, missing, missing, missing, config=PRESETS.get(preset, TrainConfig())
+        missing, missing, missing, missing, config=PRESETS.get(preset, SmokeConfig())
     )
     ablate(parse("evaluate", Ablation, arguments, default=defaults))
 
@@ -128,7 +128,7 @@ def ablate(options: Ablation) -> None:
         _write(options.json, {name: [*map(as_json, runs)] for name, runs in found.items()})
 
 
-def _configurations(options: Ablation) -> Iterator[tuple[str, TrainConfig]]:
+def _configurations(options: Ablation) -> Iterator[tuple[str, SmokeConfig]]:
     for variant, (motion, velocity) in VARIANTS.items():
         config = options.config
         if not motion:
@@ -144,7 +144,7 @@ class _Run(NamedTuple):
     """A training of the ablation: of which variant, where, and whether it is there already."""
 
     variant: str
-    config: TrainConfig
+    config: SmokeConfig
     folder: Path
     is_trained: bool
 

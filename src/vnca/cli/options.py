@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import tyro
 
-from vnca.cli.progress import end_line
+from vnca.cli.progress import as_options, end_line
 
 T = TypeVar("T")
 
@@ -39,4 +39,4 @@ def is_given(arguments: Sequence[str], option: str) -> bool:
 def say(line: str) -> None:
     """Tell the user something that is not the result: on standard error, on a line of its own."""
     end_line()
-    print(line, file=sys.stderr, flush=True)
+    print(as_options(line), file=sys.stderr, flush=True)

@@ -1,17 +1,24 @@
 """Progress of long work: how far, how fast, how long still."""
 
+import re
 import sys
 import time
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
 T = TypeVar("T")
+_ARGUMENT = re.compile(r"`([a-z_]+(?:\.[a-z_]+)*)`")
 
 # A terminal line is redrawn; a log gets a line now and then.
 _REDRAW_SECONDS = 0.2
 _LOG_SECONDS = 15.0
 
 _line_is_open = False
+
+
+def as_options(text: str) -> str:
+    """What the library says of arguments, such as `view.size`, in the words of the command line."""
+    return _ARGUMENT.sub(lambda found: "--" + found[1].replace("_", "-"), text)
 
 
 def end_line() -> None:

@@ -25,7 +25,7 @@ from vnca.features.network import FeatureNetwork
 from vnca.io.picture import resize, to_srgb8
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
-from vnca.training.config import CourseConfig
+from vnca.training.config import TrainingConfig
 from vnca.training.loop import Trainer
 from vnca.training.memory import is_out_of_memory, memory_advice, memory_budget
 from vnca.training.preview import preview_sheet
@@ -263,7 +263,7 @@ def run_folder(path: Path, *, overwrite: bool, checkpoint: Checkpoint | None) ->
 
 def asked(options: Any) -> dict[str, Any]:
     """The options of a training as JSON, with paths that hold from any folder."""
-    config: CourseConfig = options.config
+    config: TrainingConfig = options.config
     if Path(config.features).suffix:  # else a name
         config = dataclasses.replace(config, features=str(Path(config.features).absolute()))
     given = {field.name: getattr(options, field.name) for field in dataclasses.fields(options)}
@@ -282,7 +282,7 @@ def shown_and_judged(trainer: Trainer, network: FeatureNetwork) -> dict[str, Any
 
 
 @contextmanager
-def fitting(config: CourseConfig, what: str) -> Iterator[None]:
+def fitting(config: TrainingConfig, what: str) -> Iterator[None]:
     """While a trainer is made of `what` is trained on.
 
     Raises:

@@ -36,8 +36,8 @@ from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule, RuleConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.memory import memory_budget
-from vnca.training.pretraining import SHAPE, SHARES, beginning_config, deaf_to_priors
-from vnca.training.smoke_config import PRESETS, TrainConfig
+from vnca.training.pretraining import SHAPE, SHARES, pretraining_config, without_prior_weights
+from vnca.training.smoke_config import PRESETS, SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 from vnca.training.texture_config import TextureConfig
 
@@ -66,7 +66,7 @@ class Train(TrainingOptions):
     """A solid texture of the picture that is trained already, to begin with instead."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
-    config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=TrainConfig)
+    config: Annotated[SmokeConfig, tyro.conf.arg(name="")] = field(default_factory=SmokeConfig)
     """Hyperparameters."""
 
     def __post_init__(self) -> None:
@@ -95,7 +95,7 @@ def run(arguments: Sequence[str]) -> None:
     preset = chosen(arguments, "--preset", "draft")
     missing: Any = tyro.MISSING
     defaults = Train(
-        frame=missing, style=missing, out=missing, config=PRESETS.get(preset, TrainConfig())
+        frame=missing, style=missing, out=missing, config=PRESETS.get(preset, SmokeConfig())
     )
     train(parse(COMMAND, Train, arguments, default=defaults))
 
@@ -152,16 +152,16 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         if checkpoint is not None:
             checkpoint.require(session.inputs, folder.path / CHECKPOINT_NAME)
         share = SHARES[options.preset] if options.texture is None else options.texture
-        beginning = beginning_config(config, share, trainer.picture_cells)
+        beginning = pretraining_config(config, share, trainer.picture_cells)
         if options.begin_with is not None:
-            trainer.begin_with(deaf_to_priors(_given(options.begin_with, config.rule)))
+            trainer.begin_with(without_prior_weights(_given(options.begin_with, config.rule)))
         elif beginning is not None:
             if checkpoint is None and options.overwrite:
                 # Resuming must not take the texture of the run that was there for this one's.
                 remove_file(options.out / TEXTURE_FOLDER / MODEL_NAME)
             folder.reserve(Checkpoint({}, session.inputs, COMMAND, session.asked))
             texture = _texture(options, beginning, goes_on=checkpoint is not None)
-            trainer.begin_with(deaf_to_priors(texture))
+            trainer.begin_with(without_prior_weights(texture))
         checkpoint = None
     notes = []
     if config.motion.weight and smoke.velocity is not None and not trainer.teaches_motion:
@@ -171,7 +171,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
 
 
 def training_inputs(
-    smoke: Volume, style: FloatArray, config: TrainConfig, network: FeatureNetwork
+    smoke: Volume, style: FloatArray, config: SmokeConfig, network: FeatureNetwork
 ) -> dict[str, str]:
     """What tells a training on smoke from others: the `fingerprints` of what goes into it."""
     frame = [smoke.density, smoke.origin]

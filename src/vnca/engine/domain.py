@@ -78,9 +78,9 @@ class Domain:
         """
         if math.prod(box.shape) > MOST_CELLS:
             raise OptionError(
-                f"--domain box: the box of the smoke, {box.lower} to {box.upper}, has "
+                f"`domain` box: the box of the smoke, {box.lower} to {box.upper}, has "
                 f"{math.prod(box.shape)} cells, and at most {MOST_CELLS} can live; "
-                "use --domain active"
+                "use `domain` active"
             )
         return cls.from_mask(np.ones(box.shape, dtype=bool), box.lower)
 

@@ -67,7 +67,7 @@ def require_fitting(
         if layer not in known:
             raise OptionError(
                 f"layer {layer!r}: features '{network.name}' have {', '.join(known)}; see "
-                "--appearance.layers"
+                "`appearance.layers`"
             )
     if image.ndim != 4 or image.shape[1] != 3 or min(image.shape[2:]) < SMALLEST:
         raise ShapeError(

@@ -55,9 +55,7 @@ IMAGENET_SHA256 = "88682ab5"
 _FORMAT = "vnca-vgg16-1"
 _PART = ".part"
 _KERAS = re.compile(r"^block(\d)_conv(\d)")
-_ALTERNATIVES = (
-    "leave `--features` out, use `--features edges`, or give `--features` the path of a file"
-)
+_ALTERNATIVES = "leave `features` out, use `features` edges, or give `features` the path of a file"
 _CAFFE_MEAN = (123.68 / 255, 116.779 / 255, 103.939 / 255)
 
 

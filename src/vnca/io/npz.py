@@ -118,7 +118,7 @@ def _stored_velocity(path: Path, domain: Box, box: Box, staggered: bool) -> Stor
     if values.shape[:3] != domain.shape:
         raise GridError(
             f"{path}: velocity of {values.shape[:3]} cells (x, y, z), the density beside it has "
-            f"{domain.shape}; leave the velocity out with --velocity-grid none"
+            f"{domain.shape}; leave the velocity out with `velocity_grid` none"
         )
     whole = upper_grown(box)
     inside = whole.intersection(domain)

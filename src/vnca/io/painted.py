@@ -135,7 +135,7 @@ def read_colour(
         header = file.grids[grid]
         what = f"{path}: grid '{grid}'"
         if not header.value_type.startswith("vec3"):
-            raise GridError(f"{what} holds {header.value_type}, not a colour; see --colour-grid")
+            raise GridError(f"{what} holds {header.value_type}, not a colour; see `colour_grid`")
         stored = header.read()
         own = upright_world(header.transform.index_to_world, up_axis_of(path, format))
         ours = own_cells(own, what)[1] if lattice is None else lattice.to_world

@@ -163,7 +163,7 @@ def _selected(path: Path, found: _Found, wanted: tuple[int, ...] | None) -> Fram
         first, last = min(by_number), max(by_number)
         if last - first > MAX_FRAMES:
             raise SequenceError(
-                f"{path}: frame numbers run from {first} to {last}; choose some with --frames"
+                f"{path}: frame numbers run from {first} to {last}; choose some with `frames`"
             )
         wanted = tuple(range(first, last + 1))
     chosen = tuple(by_number[number] for number in wanted if number in by_number)
@@ -279,7 +279,7 @@ def _one_sequence(
     ((pattern, found),) = sequences.items()
     if found.sub_frames and (wanted is None or not found.frames):
         whole = format_frames(frame.number for frame in found.frames)
-        instead = f"--frames {whole}" if whole else pattern
+        instead = f"`frames` {whole}" if whole else pattern
         raise _no_sub_frames(path, found.sub_frames, f"; choose whole frames with {instead}")
     return found
 

@@ -197,7 +197,7 @@ def _non_negative(density: Field, path: Path) -> Field:
     if least < -NEGATIVE_TOLERANCE * most:
         raise GridError(
             f"{path}: density goes from {least:g} to {most:g}; expected none below zero; "
-            "choose another grid with --density-grid"
+            "choose another grid with `density_grid`"
         )
     return replace(density, values=np.maximum(density.values, 0))
 

@@ -13,7 +13,7 @@ from vnca.io.orientation import UpAxis
 from vnca.io.velocity import VelocityUnits
 
 NO_VELOCITY = "none"
-NOT_WANTED = "--velocity-grid none says that none is wanted"
+NOT_WANTED = "`velocity_grid` none says that none is wanted"
 # What a velocity grid's metadata says of its units, where it was written by vnca.
 UNITS_METADATA = "velocity_units"
 CELLS_PER_FRAME: VelocityUnits = "cells/frame"
@@ -37,7 +37,7 @@ class SmokeFormat:
     class or offset in VDB files, always in Mantaflow's npz files."""
 
     velocity_units: VelocityUnits = "cells/frame"
-    """Units of the velocity. Blender's caches need mantaflow, with --fps and --time-scale. Files
+    """Units of the velocity. Blender's caches need mantaflow, with `fps` and `time_scale`. Files
     that `vnca simulate` wrote say their own, which count instead of these options."""
 
     fps: float = 24.0
@@ -130,5 +130,5 @@ def single_precision(
     count = values.size if stored is None else values[stored].size
     raise GridError(
         f"{path}: {what}: {bad} of {count} values are NaN, infinite or beyond float32; "
-        "simulate the frame again or leave it out with --frames"
+        "simulate the frame again or leave it out with `frames`"
     )

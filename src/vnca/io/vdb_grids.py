@@ -52,7 +52,7 @@ def velocity_headers(file: VdbFile, format: SmokeFormat) -> list[GridHeader]:
     found += [parts for parts in like if not _missing(file, parts)]
     if len(found) > 1:
         raise GridError(
-            f"{file.path}: several grids could be the velocity; choose with --velocity-grid from "
+            f"{file.path}: several grids could be the velocity; choose with `velocity_grid` from "
             f"{', '.join(parts[0] for parts in found)}"
         )
     if found:
@@ -62,7 +62,7 @@ def velocity_headers(file: VdbFile, format: SmokeFormat) -> list[GridHeader]:
     if asked is None:
         return []
     raise GridError(
-        f"{file.path}: no velocity {asked!r}; choose with --velocity-grid none or "
+        f"{file.path}: no velocity {asked!r}; choose with `velocity_grid` none or "
         f"a grid of vectors from {file.listed()}"
     )
 
@@ -98,6 +98,6 @@ def _three(file: VdbFile, parts: tuple[str, str, str]) -> list[GridHeader]:
     if missing:
         raise GridError(
             f"{file.path}: velocity {_stem(parts)!r} lacks the scalar grid {', '.join(missing)}; "
-            "leave the velocity out with --velocity-grid none"
+            "leave the velocity out with `velocity_grid` none"
         )
     return [file.grids[part] for part in parts]

@@ -77,7 +77,7 @@ def where_vdb_velocity_is(path: Path) -> str:
         vectors = listed_vectors(file)
     if not vectors:
         return f"no other grid of vectors either ({NOT_WANTED})"
-    return f"choose with --velocity-grid from {vectors} ({NOT_WANTED})"
+    return f"choose with `velocity_grid` from {vectors} ({NOT_WANTED})"
 
 
 def density_header(file: VdbFile, format: SmokeFormat) -> GridHeader:
@@ -90,12 +90,12 @@ def density_header(file: VdbFile, format: SmokeFormat) -> GridHeader:
     if name not in file.names:
         raise GridError(
             f"{file.path}: no density grid {name!r}; "
-            f"choose with --density-grid from {file.listed()}"
+            f"choose with `density_grid` from {file.listed()}"
         )
     header = file.grids[name]
     label = f"{file.path}: density grid {name!r}"
     if components(header) == 3:
-        raise GridError(f"{label} holds vectors, expected numbers; choose with --density-grid")
+        raise GridError(f"{label} holds vectors, expected numbers; choose with `density_grid`")
     if header.grid_class == "level set":
         raise GridError(f"{label} is a level set, expected a fog volume; convert it first")
     return header
@@ -129,7 +129,7 @@ def _read_velocity(
     if not headers and file.unfound and format.velocity_grid is None:
         raise GridError(
             f"{file.path}: no velocity among {file.listed()}; write the file again with offsets, "
-            "or leave the velocity out with --velocity-grid none"
+            "or leave the velocity out with `velocity_grid` none"
         )
     if not headers:
         return None
@@ -137,7 +137,7 @@ def _read_velocity(
         if header.linear_transform is None:
             raise GridError(
                 f"{file.path}: velocity grid {header.name!r} has a {header.map_type}, and only "
-                "linear transforms are supported; leave it out with --velocity-grid none"
+                "linear transforms are supported; leave it out with `velocity_grid` none"
             )
     # A vector grid has one transform for all components, a scalar one its own.
     axes = (None,) if len(headers) == 1 else (0, 1, 2)
@@ -191,7 +191,7 @@ def _around(header: GridHeader, density: Field) -> tuple[Field, Field]:
         raise GridError(
             f"{header.source.path}: velocity grid {header.name!r} covers {_extent(there)}, the "
             f"density {_extent(box)}: they do not meet; leave the velocity out with "
-            "--velocity-grid none"
+            "`velocity_grid` none"
         )
     return _finite(header, grid, whole, near=bricks_beside(density.bricks))
 

@@ -55,7 +55,7 @@ def resampled_velocity(
             raise GridError(
                 f"{header.source.path}: velocity grids {headers[0].name!r} and {header.name!r} "
                 "differ in their voxels; resample one, or leave the velocity out with "
-                "--velocity-grid none"
+                "`velocity_grid` none"
             )
     faces = [0.5 * _is_staggered(h, format, is_apart) * np.eye(3) for h in headers]
     if len(headers) == 3:
@@ -118,7 +118,7 @@ def _at_centres(
     if near is None:
         raise GridError(
             f"{label} has more cells where the smoke is than {MOST_TILE_CELLS}; resample it, or "
-            "leave it out with --velocity-grid none"
+            "leave it out with `velocity_grid` none"
         )
     stored, active = grid.fields(part, near=near)
     what = f"grid {header.name!r}"
@@ -141,7 +141,7 @@ def _at_centres(
     if not where.values.any():
         raise GridError(
             f"{label} has no value near the smoke: they do not meet; leave the velocity out with "
-            "--velocity-grid none"
+            "`velocity_grid` none"
         )
     return Field(bricks, values.reshape(*shape, *kind), box).within(box), where
 

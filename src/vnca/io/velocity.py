@@ -200,7 +200,7 @@ def fit_velocity_scale(first: Volume, second: Volume) -> float:
     if best in (0, len(tried) - 1):
         raise GridError(
             f"frames {first.frame} and {second.frame}: no velocity scale up to {_FIT_MOST:g} "
-            "carries one to the other; check --velocity-units, or set --velocity-scale"
+            "carries one to the other; check `velocity_units`, or set `velocity_scale`"
         )
     bounds = tried[best - 1], tried[best + 1]
     fit: Any = optimize.minimize_scalar(mismatch, bounds=bounds, method="bounded")

@@ -15,7 +15,7 @@ from vnca.core.typing import FloatArray
 from vnca.features.network import FeatureNetwork
 from vnca.features.strokes import picture_cells
 from vnca.losses.moments import Moments, moment_distance, moments
-from vnca.losses.pixels import luminance, palette_distance
+from vnca.losses.pixels import luma, palette_distance
 from vnca.losses.style import sample_positions, style_distance
 from vnca.rendering.colour import linear_to_srgb
 
@@ -52,24 +52,24 @@ class AppearanceConfig:
         for name in ("style", "moments", "pixels"):
             if getattr(self, name) < 0:
                 raise OptionError(
-                    f"--appearance.{name} {getattr(self, name)}: must not be negative"
+                    f"`appearance.{name}` {getattr(self, name)}: must not be negative"
                 )
         if not (self.colour or self.grey):
-            raise OptionError("--appearance.colour, --appearance.grey: at least one is needed")
+            raise OptionError("`appearance.colour`, `appearance.grey`: at least one is needed")
         if self.samples < 1:
-            raise OptionError(f"--appearance.samples {self.samples}: must be at least 1")
+            raise OptionError(f"`appearance.samples` {self.samples}: must be at least 1")
         if not 0 <= self.opacity_threshold < 1:
             raise OptionError(
-                f"--appearance.opacity-threshold {self.opacity_threshold}: must be at least 0 "
+                f"`appearance.opacity_threshold` {self.opacity_threshold}: must be at least 0 "
                 "and below 1"
             )
         if self.grey_source == "density" and not self.grey:
             raise OptionError(
-                "--appearance.grey-source density: nothing is compared in grey; "
-                "add --appearance.grey"
+                "`appearance.grey_source` density: nothing is compared in grey; "
+                "add `appearance.grey`"
             )
         if self.style_scale is not None and not 0 < self.style_scale < inf:
-            raise OptionError(f"--appearance.style-scale {self.style_scale}: must be positive")
+            raise OptionError(f"`appearance.style_scale` {self.style_scale}: must be positive")
 
     @property
     def shows_density(self) -> bool:
@@ -226,7 +226,7 @@ class AppearanceLoss:
 
     def _features(self, picture: Tensor, grey: Tensor | None = None) -> list[list[Tensor]]:
         """Per layer, the maps of the picture in colour, in grey, or both."""
-        grey = luminance(picture) if grey is None else grey
+        grey = luma(picture) if grey is None else grey
         kinds = [picture] * self.config.colour + [grey] * self.config.grey
         maps = self._network.features(torch.cat(kinds), self.config.layers or None)
         return [list(layer.split(len(picture))) for layer in maps]

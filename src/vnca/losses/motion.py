@@ -34,16 +34,16 @@ class MotionConfig:
     def __post_init__(self) -> None:
         for name in ("weight", "direction", "magnitude", "slowest"):
             if not 0 <= getattr(self, name) < inf:
-                raise OptionError(f"--motion.{name} {getattr(self, name)}: must be 0 or more")
+                raise OptionError(f"`motion.{name}` {getattr(self, name)}: must be 0 or more")
         if self.size < 32:
-            raise OptionError(f"--motion.size {self.size}: at least 32 pixels are needed")
+            raise OptionError(f"`motion.size` {self.size}: at least 32 pixels are needed")
         if not 0 <= self.opacity_threshold < 1:
             raise OptionError(
-                f"--motion.opacity-threshold {self.opacity_threshold}: must be at least 0 and "
+                f"`motion.opacity_threshold` {self.opacity_threshold}: must be at least 0 and "
                 "below 1"
             )
         if self.balance_over < 0:
-            raise OptionError(f"--motion.balance-over {self.balance_over}: must be 0 or more")
+            raise OptionError(f"`motion.balance_over` {self.balance_over}: must be 0 or more")
 
 
 class Motion(NamedTuple):

@@ -30,7 +30,7 @@ def palette_distance(x: Float[Tensor, "n 3"], y: Float[Tensor, "m 3"]) -> Float[
     return relaxed_earth_movers_distance(to_yuv(x), to_yuv(y), _yuv_cost)
 
 
-def luminance(rgb: Float[Tensor, "b 3 r c"]) -> Float[Tensor, "b 3 r c"]:
+def luma(rgb: Float[Tensor, "b 3 r c"]) -> Float[Tensor, "b 3 r c"]:
     """The BT.601 brightness of sRGB in all three channels."""
     weights = rgb.new_tensor(_YUV[0]).view(1, 3, 1, 1)
     return (rgb * weights).sum(1, keepdim=True).expand_as(rgb)

@@ -34,7 +34,7 @@ class Placement:
             OptionError: If the scale is not positive.
         """
         if not 0 < scale < np.inf:
-            raise OptionError(f"--scale {scale}: must be positive")
+            raise OptionError(f"`scale` {scale}: must be positive")
         low, high = mesh.bounds
         return cls(low, size * scale / float((high - low).max()))
 

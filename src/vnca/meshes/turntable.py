@@ -50,15 +50,15 @@ class TurntableConfig:
 
     def __post_init__(self) -> None:
         if self.rows < 16 or self.columns < 16:
-            raise OptionError("--rows and --columns: at least 16 pixels are needed")
+            raise OptionError("`rows` and `columns`: at least 16 pixels are needed")
         if self.frames < 1:
-            raise OptionError(f"--frames {self.frames}: at least 1 is needed")
+            raise OptionError(f"`frames` {self.frames}: at least 1 is needed")
         if not -90 <= self.elevation <= 90:
-            raise OptionError(f"--elevation {self.elevation}: must be -90 to 90 degrees")
+            raise OptionError(f"`elevation` {self.elevation}: must be -90 to 90 degrees")
         if not (isfinite(self.azimuth) and isfinite(self.turn)):
-            raise OptionError("--azimuth and --turn: expected numbers of degrees")
+            raise OptionError("`azimuth` and `turn`: expected numbers of degrees")
         if not 0 < self.fps <= 1000:
-            raise OptionError(f"--fps {self.fps}: must be positive, at most 1000")
+            raise OptionError(f"`fps` {self.fps}: must be positive, at most 1000")
 
 
 class Turntable:

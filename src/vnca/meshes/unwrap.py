@@ -79,7 +79,7 @@ def unwrapped(mesh: Mesh, unwrap: Unwrap, *, size: int) -> Atlas:
                 return Atlas(kept, texels)
             fault = f"{texels.overlap:.1%} of the texels belong to several faces"
         if unwrap == "never":
-            raise GridError(f"{mesh.glb.path}: its UVs cannot be used ({fault}); --unwrap always")
+            raise GridError(f"{mesh.glb.path}: its UVs cannot be used ({fault}); `unwrap` always")
     made = _unwrap(mesh.surfaces, size)
     had_some = any(surface.uv is not None for surface in mesh.surfaces)
     return Atlas(made, texel_map(mesh.surfaces, made, size), fault if had_some else None)

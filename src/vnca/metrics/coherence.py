@@ -13,7 +13,7 @@ from vnca.core.camera import Camera
 from vnca.core.colour import linear_to_srgb, luminance
 from vnca.core.typing import AnyArray, FloatArray
 from vnca.metrics.estimators import Estimator
-from vnca.metrics.stage import OPAQUE, Pair, Seen, Stage
+from vnca.metrics.setup import OPAQUE, Pair, Seen, Setup
 from vnca.metrics.style import perceived
 
 LONG = 7
@@ -188,7 +188,7 @@ def _followed(shots: Sequence[_Shot]) -> tuple[AnyArray, AnyArray] | None:
     return start[seen], at[seen]
 
 
-def around(stage: Stage, ring: Sequence[Pair]) -> Agreement | None:
+def around(setup: Setup, ring: Sequence[Pair]) -> Agreement | None:
     """How views agree with the next, the last with the first, on what both see.
 
     What a pixel shows lies at the mean depth of the smoke seen there. From the next view it is
@@ -198,13 +198,13 @@ def around(stage: Stage, ring: Sequence[Pair]) -> Agreement | None:
         The mean over the views, or None where neighbours see nothing in common.
     """
     turned = [*ring[1:], *ring[:1]]
-    return mean_agreement(_reprojected(stage, *pair) for pair in zip(ring, turned, strict=True))
+    return mean_agreement(_reprojected(setup, *pair) for pair in zip(ring, turned, strict=True))
 
 
-def _reprojected(stage: Stage, first: Pair, second: Pair) -> Agreement | None:
-    start, size = np.argwhere(first.where), stage.size
+def _reprojected(setup: Setup, first: Pair, second: Pair) -> Agreement | None:
+    start, size = np.argwhere(first.where), setup.size
     depth = first.painted.depth[tuple(start.T)]
-    here, there = (stage.camera(pair.sight) for pair in (first, second))
+    here, there = (setup.camera(pair.viewpoint) for pair in (first, second))
     points = _points(here, start, depth, size)
     row, column, expected = there.project(points, size, size)
     at = np.stack([row, column], axis=-1)

@@ -14,8 +14,8 @@ from vnca.core.colour import linear_to_srgb
 from vnca.core.typing import AnyArray, BoolArray
 from vnca.features.network import SMALLEST, FeatureNetwork
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
-from vnca.metrics.stage import Pair
-from vnca.metrics.style import StyleGauge, gap_closed
+from vnca.metrics.setup import Pair
+from vnca.metrics.style import StyleMetric, gap_closed
 
 _SEED = 0
 
@@ -39,30 +39,30 @@ class Judge:
 
     @classmethod
     def of(
-        cls, network: FeatureNetwork, trained_with: bool | None, gauge: StyleGauge, size: int
+        cls, network: FeatureNetwork, trained_with: bool | None, metric: StyleMetric, size: int
     ) -> "Judge":
         """A judge of views.
 
         Args:
             network: What compares.
             trained_with: Whether the rule was trained with it.
-            gauge: Has the picture, as large as it is to be compared.
+            metric: Has the picture, as large as it is to be compared.
             size: Rows and columns of the views.
         """
-        shorter = min(gauge.picture.shape[:2])
+        shorter = min(metric.picture.shape[:2])
         config = AppearanceConfig(pixels=0.0, grey=False, style_scale=shorter / size)
-        loss = AppearanceLoss(network, gauge.picture, config, size)
+        loss = AppearanceLoss(network, metric.picture, config, size)
         return cls(network.name, trained_with, _loss=loss)
 
-    def look(self, frame: int, pairs: Sequence[Pair], gauge: StyleGauge) -> None:
-        """Judge views of a frame, as `likeness` does by measures that never learned.
+    def look(self, frame: int, pairs: Sequence[Pair], metric: StyleMetric) -> None:
+        """Judge views of a frame, as `style_score` does by measures that never learned.
 
         A view counts as far as both ways of the smoke are opaque in it.
         """
         pairs = [pair for pair in pairs if pair.where.any()]
         if self._loss is None or not pairs:
             return
-        behind = gauge.background
+        behind = metric.background
         painted, plain, cutout = (
             float(np.mean([self._distance(*one) for one in some]))
             for some in (
@@ -71,7 +71,7 @@ class Judge:
                 [
                     part
                     for seed, pair in enumerate(pairs)
-                    for part in gauge.cutouts(pair.where, 1, seed)
+                    for part in metric.cutouts(pair.where, 1, seed)
                 ],
             )
         )

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from vnca.metrics.coherence import LONG, Agreement, mean_agreement
-from vnca.metrics.likeness import joined_likeness
+from vnca.metrics.style_score import joined_style_score
 from vnca.metrics.survey import Survey, TextureMotion
 
 _PART = {
@@ -65,7 +65,7 @@ def measures(survey: Survey) -> tuple[Measure, ...]:
 
 
 def _style(survey: Survey) -> Iterable[Measure]:
-    style = joined_likeness(survey.style.values())
+    style = joined_style_score(survey.style.values())
     yield Measure(
         "style.gap_closed",
         "Style gap closed",
@@ -77,7 +77,9 @@ def _style(survey: Survey) -> Iterable[Measure]:
         unstylized=0.0,
         more={
             **style.by_measure,
-            "frames": {frame: likeness.gap_closed for frame, likeness in survey.style.items()},
+            "frames": {
+                frame: style_score.gap_closed for frame, style_score in survey.style.items()
+            },
         },
     )
     for judge in survey.judges:
@@ -101,15 +103,21 @@ def _views(survey: Survey) -> Iterable[Measure]:
         "views.spread",
         "Spread over views",
         "How much the share of the gap closed varies from side to side, above and below.",
-        turn.likeness.spread,
+        turn.style_score.spread,
         "standard deviation over mean",
         "lower",
         more={
             "frame": turn.frame,
-            "mean": turn.likeness.gap_closed,
+            "mean": turn.style_score.gap_closed,
             "views": [
-                {"azimuth": sight.azimuth, "elevation": sight.elevation, "gap_closed": share}
-                for sight, share in zip(turn.likeness.sights, turn.likeness.shares, strict=True)
+                {
+                    "azimuth": viewpoint.azimuth,
+                    "elevation": viewpoint.elevation,
+                    "gap_closed": share,
+                }
+                for viewpoint, share in zip(
+                    turn.style_score.viewpoints, turn.style_score.shares, strict=True
+                )
             ],
         },
     )

@@ -18,14 +18,14 @@ from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.session import Compute
 from vnca.losses.motion import MotionConfig, compare_motion, supervised
-from vnca.losses.pixels import luminance
+from vnca.losses.pixels import luma
 from vnca.metrics.estimators import Estimator
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import Roll
 from vnca.rendering.colour import linear_to_srgb
 from vnca.rendering.sample import sample
 from vnca.rule.rule import COLOUR, Rule
-from vnca.training.scenes.smoke import SmokeScene, SmokeSight
+from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
 from vnca.training.smoke_config import ViewConfig
 
 AZIMUTHS = (0.0, 60.0, 120.0, 180.0, 240.0, 300.0)
@@ -267,13 +267,13 @@ def _look(scene: SmokeScene, before: FloatArray, after: FloatArray, azimuth: flo
 
 def _target(scene: SmokeScene, state: Tensor, azimuth: float) -> tuple[Tensor, Tensor]:
     """How the smoke is seen to move, `[r, c, 2]`, and where motion is compared, `[r, c]`."""
-    sight = SmokeSight(scene.camera(azimuth, ELEVATION), offset=0.0)
-    target, opacity = scene.motion(state, sight, scene.view.size)
+    viewpoint = SmokeViewpoint(scene.camera(azimuth, ELEVATION), offset=0.0)
+    target, opacity = scene.motion(state, viewpoint, scene.view.size)
     return target, supervised(target, opacity, MotionConfig())
 
 
 def _grey(picture: Tensor) -> FloatArray:
-    return luminance(linear_to_srgb(picture).permute(2, 0, 1)[None])[0, 0].numpy()
+    return luma(linear_to_srgb(picture).permute(2, 0, 1)[None])[0, 0].numpy()
 
 
 def _compare(pairs: Sequence[SeenPair], estimator: Estimator) -> tuple[float, float]:

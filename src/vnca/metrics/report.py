@@ -14,7 +14,7 @@ from vnca.io.picture import fit, to_srgb8
 from vnca.metrics.coherence import LONG
 from vnca.metrics.measures import Measure
 from vnca.metrics.plots import Line, Shade, plot
-from vnca.metrics.stage import Pair, Seen
+from vnca.metrics.setup import Pair, Seen
 from vnca.metrics.style import StyleDistances
 from vnca.metrics.survey import RING, Survey, TextureMotion
 
@@ -135,15 +135,18 @@ def _views(survey: Survey) -> Iterable[str]:
     yield _grid(
         [
             [
-                (_shown(seen.painted), f"{seen.sight.azimuth:g}°, {_from(seen.sight.elevation)}")
+                (
+                    _shown(seen.painted),
+                    f"{seen.viewpoint.azimuth:g}°, {_from(seen.viewpoint.elevation)}",
+                )
                 for seen in shown
             ],
             [(_shown(seen.plain), "") for seen in shown],
         ],
         _around_smoke(shown),
     )
-    shares = dict(zip(turn.likeness.sights, turn.likeness.shares, strict=True))
-    level = {sight: share for sight, share in shares.items() if sight in RING}
+    shares = dict(zip(turn.style_score.viewpoints, turn.style_score.shares, strict=True))
+    level = {viewpoint: share for viewpoint, share in shares.items() if viewpoint in RING}
     lines = [Line("all around", [s.azimuth for s in level], [*level.values()], "painted")]
     for sign, label, shade in _POLES:
         some = {s: v for s, v in shares.items() if s not in RING and s.elevation * sign > 0}

@@ -89,7 +89,7 @@ def gap_closed(painted: Sequence[float], plain: Sequence[float], cutout: Sequenc
     return 1 - left / gap if gap > 0 else float(left == 0)
 
 
-class StyleGauge:
+class StyleMetric:
     """Measures how far pictures are from one style picture.
 
     Attributes:

@@ -12,27 +12,27 @@ from vnca.metrics.coherence import Agreement, Coherence, Step, around
 from vnca.metrics.density import DensityChange
 from vnca.metrics.estimators import Estimator, estimators
 from vnca.metrics.judges import Judge
-from vnca.metrics.likeness import SIDES, Likeness, joined_likeness, likeness
 from vnca.metrics.motion import (
     MotionMeasures,
     measure_carried_noise,
     measure_drift,
     measure_motion,
 )
-from vnca.metrics.stage import Coloured, Pair, Sight, Stage
-from vnca.metrics.style import StyleGauge
+from vnca.metrics.setup import Coloured, Pair, Setup, Viewpoint
+from vnca.metrics.style import StyleMetric
+from vnca.metrics.style_score import SIDES, StyleScore, joined_style_score, style_score
 from vnca.painting.roll import Painting
 from vnca.rule.rule import Rule
 
-RING = tuple(Sight(15.0 * turn, 10.0) for turn in range(24))
+RING = tuple(Viewpoint(15.0 * turn, 10.0) for turn in range(24))
 """Views all around the smoke."""
 POLES = tuple(
-    Sight(azimuth, elevation)
+    Viewpoint(azimuth, elevation)
     for elevation in (60.0, -60.0)
     for azimuth in (0.0, 90.0, 180.0, 270.0)
 )
 """Views from above and below."""
-FILM = Sight(0.0, 10.0)
+FILM = Viewpoint(0.0, 10.0)
 """From where the frames are compared with each other."""
 STYLE_FRAMES = 5
 """Frames that are compared with the picture."""
@@ -79,14 +79,14 @@ class Turn:
     Attributes:
         frame: Its number.
         ring: Its views all around, and from above and below.
-        likeness: How much they look like the picture.
+        style_score: How much they look like the picture.
         around: How the views all around agree with their neighbours.
         texture: How the texture moves, or why that is not known.
     """
 
     frame: int
     ring: tuple[Pair, ...]
-    likeness: Likeness
+    style_score: StyleScore
     around: Agreement | None
     texture: TextureMotion | str
 
@@ -97,7 +97,7 @@ class Survey:
 
     Attributes:
         frames: Numbers of the frames painted.
-        style: The likeness of four sides of some frames, by frame; at least of one.
+        style: The style_score of four sides of some frames, by frame; at least of one.
         judges: What networks say of the same.
         turn: The middle frame.
         steps: How each frame agrees with those before.
@@ -106,7 +106,7 @@ class Survey:
     """
 
     frames: tuple[int, ...]
-    style: dict[int, Likeness]
+    style: dict[int, StyleScore]
     judges: tuple[Judge, ...]
     turn: Turn
     steps: tuple[Step, ...]
@@ -118,8 +118,8 @@ def survey(
     paintings: Iterable[Painting],
     count: int,
     rule: Rule,
-    stage: Stage,
-    gauge: StyleGauge,
+    setup: Setup,
+    metric: StyleMetric,
     judges: Sequence[Judge] = (),
 ) -> Survey:
     """Measure a sequence while it is painted; no more than a few frames are kept at a time.
@@ -128,8 +128,8 @@ def survey(
         paintings: Its frames in order.
         count: How many there are, one at least.
         rule: What paints them.
-        stage: How they are looked at.
-        gauge: What they are compared with.
+        setup: How they are looked at.
+        metric: What they are compared with.
         judges: Networks that compare them with it, too.
 
     Raises:
@@ -145,29 +145,31 @@ def survey(
         painted, plain = Coloured.painted(painting), Coloured.plain(smoke)
         frames.append(smoke.frame)
         density.append(DensityChange.of(painting))
-        film = stage.look_twice(painted, plain, FILM)
-        coherence.add(smoke.frame, film, stage.motion(smoke, FILM))
+        film = setup.look_twice(painted, plain, FILM)
+        coherence.add(smoke.frame, film, setup.motion(smoke, FILM))
         if at in kept:
             strip.append(Still(smoke.frame, film, coherence.difference))
         if at in compared:
-            pairs = [stage.look_twice(painted, plain, sight) for sight in SIDES]
-            if (found := likeness(gauge, pairs)) is not None:
+            pairs = [setup.look_twice(painted, plain, viewpoint) for viewpoint in SIDES]
+            if (found := style_score(metric, pairs)) is not None:
                 style[smoke.frame] = found
                 for judge in judges:
-                    judge.look(smoke.frame, pairs, gauge)
+                    judge.look(smoke.frame, pairs, metric)
         if at == count // 2:
-            ring = tuple(stage.look_twice(painted, plain, sight) for sight in (*RING, *POLES))
+            ring = tuple(
+                setup.look_twice(painted, plain, viewpoint) for viewpoint in (*RING, *POLES)
+            )
             turn = Turn(
                 smoke.frame,
                 ring,
-                joined_likeness([likeness(gauge, ring)]),
-                around(stage, ring[: len(RING)]),
+                joined_style_score([style_score(metric, ring)]),
+                around(setup, ring[: len(RING)]),
                 _texture(rule, smoke, seen_by),
             )
     assert turn is not None, "there are fewer paintings than was said"
     return Survey(
         tuple(frames),
-        style or {turn.frame: turn.likeness},
+        style or {turn.frame: turn.style_score},
         tuple(judges),
         turn,
         coherence.steps,

@@ -27,8 +27,8 @@ class StylizeConfig:
 
     def __post_init__(self) -> None:
         if self.warmup < 0 or (self.steps_per_frame is not None and self.steps_per_frame < 0):
-            raise OptionError("--steps-per-frame and --warmup must not be negative")
+            raise OptionError("`steps_per_frame` and `warmup` must not be negative")
         for name in ("strength", "density_strength"):
             if not 0 <= getattr(self, name) <= 1:
                 option = name.replace("_", "-")
-                raise OptionError(f"--{option} {getattr(self, name)}: must be from 0 to 1")
+                raise OptionError(f"`{option}` {getattr(self, name)}: must be from 0 to 1")

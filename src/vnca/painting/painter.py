@@ -103,7 +103,7 @@ class Painter:
             self.tell(f"{self.out}: going on after {len(unfinished.sources)} frames")
             return unfinished
         if path.exists():
-            self.tell(f"{self.out}: starting anew; --resume goes on with the painting there")
+            self.tell(f"{self.out}: starting anew; `resume` goes on with the painting there")
         elif resume:
             self.tell(f"{self.out}: nothing unfinished there; starting with the first frame")
         return Unfinished(self.conditions, (), self.roll.start())
@@ -242,18 +242,18 @@ class Painter:
         ):
             raise FileFormatError(
                 f"{self.unfinished_path}: damaged (its frames are not those of the sequence); "
-                "start anew without --resume"
+                "start anew without `resume`"
             )
         for frame, source in zip(self.sequence, sources, strict=False):
             if source is None:
                 continue
             if not self.target(frame).exists():
                 raise OptionError(
-                    f"{self.target(frame)}: was finished but is gone; start anew without --resume"
+                    f"{self.target(frame)}: was finished but is gone; start anew without `resume`"
                 )
             origin = self.sequence[source.frame].path
             status = existing_file(origin).stat()
             if (status.st_size, status.st_mtime_ns) != source[1:]:
                 raise OptionError(
-                    f"{origin}: has changed since it was painted; start anew without --resume"
+                    f"{origin}: has changed since it was painted; start anew without `resume`"
                 )

@@ -30,7 +30,7 @@ from vnca.rule.rule import SMOKE_THRESHOLD, Rule
 
 UNPAINTED = 1.0
 """Linear colour of smoke far from all that the rule paints: white."""
-FRINGE = 3
+COLOUR_DILATION = 3
 """How many cells beyond the living ones their colour goes on, so that faint smoke is no pale seam
 where a renderer interpolates it."""
 
@@ -106,14 +106,14 @@ class Roll:
         box: Holds the smoke of all frames, in cells of the lattice that they share. Known from the
             files' headers before the first frame is read.
         compute: How steps are computed.
-        fringe: How many cells beyond the living ones their colour goes on.
+        colour_dilation: How many cells beyond the living ones their colour goes on.
     """
 
     rule: Rule
     config: StylizeConfig
     box: Box
     compute: Compute = field(default_factory=Compute)
-    fringe: int = FRINGE
+    colour_dilation: int = COLOUR_DILATION
 
     @property
     def steps_per_frame(self) -> int:
@@ -135,7 +135,7 @@ class Roll:
             rule=self.rule.refined(factor),
             config=replace(self.config, steps_per_frame=steps),
             box=self.box.refined(factor),
-            fringe=self.fringe * factor,
+            colour_dilation=self.colour_dilation * factor,
         )
 
     def start(self) -> RollState:
@@ -176,7 +176,7 @@ class Roll:
         painted = UNPAINTED + self.config.strength * (colours(cells) - UNPAINTED)
         colour = Field.from_cells(at, painted, box, outside=UNPAINTED)
         known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
-        colour, known = extrapolated(colour, known, self.fringe)
+        colour, known = extrapolated(colour, known, self.colour_dilation)
         colour.values[~known.values] = UNPAINTED
         factors = Field.from_cells(
             at, density_factors(cells, strength=self.config.density_strength), box, outside=1.0

@@ -84,7 +84,7 @@ class Unfinished:
                 )
         except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
             raise FileFormatError(
-                f"{path}: damaged ({error}); start anew without --resume"
+                f"{path}: damaged ({error}); start anew without `resume`"
             ) from error
         return cls(conditions, sources, state)
 
@@ -99,7 +99,7 @@ def _require_same(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any
             raise OptionError(
                 f"{folder}: cannot go on, since {name} is another than when the painting was begun"
                 f"{f' ({was}, now {is_now})' * is_short}; make it the same or start anew without "
-                "--resume"
+                "`resume`"
             )
 
 

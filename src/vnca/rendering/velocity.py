@@ -22,7 +22,7 @@ def projected_velocity(
     gamma: float,
     step: float = 1.0,
     offset: float = 0.0,
-    mode: Mode = "sane",
+    mode: Mode = "emission-absorption",
     cells_to_world: AnyArray | None = None,
 ) -> tuple[Float[Tensor, "rows columns 2"], Float[Tensor, "rows columns"]]:
     """What moves in each pixel of a view, and how opaque the pixel is.

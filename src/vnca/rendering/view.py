@@ -18,7 +18,7 @@ from vnca.rendering.march import march
 from vnca.rendering.paper import paper_weights
 from vnca.rendering.sample import sample
 
-Mode = Literal["sane", "paper"]
+Mode = Literal["emission-absorption", "paper"]
 
 # Density this thin is invisible; below it a colour is no longer divided out.
 _THINNEST = 1e-12
@@ -60,7 +60,7 @@ def render(
     gamma: float,
     step: float = 1.0,
     offset: float = 0.0,
-    mode: Mode = "sane",
+    mode: Mode = "emission-absorption",
     cells_to_world: AnyArray | None = None,
 ) -> View:
     """Render smoke by emission and absorption.
@@ -83,7 +83,7 @@ def render(
         gamma: Extinction of density one, 1/length.
         step: Length between samples along a ray; one in paper mode.
         offset: Shift of all samples along their rays, in steps, in [0, 1). Training draws it.
-        mode: "sane" for the emission–absorption integral, "paper" for the paper's integrand.
+        mode: The integrand: "emission-absorption", or "paper" as the paper prints it.
         cells_to_world: 4×4, affine and invertible, from cell coordinates of these arrays (cell
             `[i, j, k]` at (i, j, k)) to where the camera is. The same unless given: lengths are
             then in cells.
@@ -164,7 +164,7 @@ def _check(
         raise OptionError(f"step: expected more than 0, got {step}")
     if not 0 <= offset < 1:
         raise OptionError(f"offset: expected 0 to less than 1, got {offset}")
-    if mode not in ("sane", "paper"):
+    if mode not in ("emission-absorption", "paper"):
         raise OptionError(f"mode: expected sane or paper, got {mode}")
     if mode == "paper" and step != 1:
         raise OptionError(f"step: the paper's integrand is defined for a step of 1, got {step}")

@@ -38,7 +38,7 @@ def priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
         density = smoke.density_field.gather(domain.cells)
         values[:, DENSITY] = np.minimum(density / scales.density, DENSITY_LIMIT)[:, None]
     if smoke.velocity_field is not None:
-        values[:, VELOCITY] = told_velocity(smoke.velocity_field.gather(domain.cells), rule)
+        values[:, VELOCITY] = normalised_velocity(smoke.velocity_field.gather(domain.cells), rule)
     return values
 
 
@@ -52,7 +52,7 @@ def _positions(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
     return np.clip(at, -1, 1).astype(np.float32)
 
 
-def told_velocity(velocity: FloatArray, rule: Rule) -> FloatArray:
+def normalised_velocity(velocity: FloatArray, rule: Rule) -> FloatArray:
     """What cells are told of a velocity `[n, 3]`, cells per frame: its direction, limited in speed.
 
     Zero if the rule switches it off.

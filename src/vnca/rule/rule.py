@@ -55,17 +55,17 @@ class RuleConfig:
 
     def __post_init__(self) -> None:
         if self.channels < 4:
-            raise OptionError(f"--channels {self.channels}: at least 4 are needed (colour and Δd)")
+            raise OptionError(f"`channels` {self.channels}: at least 4 are needed (colour and Δd)")
         if self.hidden < 1:
-            raise OptionError(f"--hidden {self.hidden}: at least 1 is needed")
+            raise OptionError(f"`hidden` {self.hidden}: at least 1 is needed")
         if not 0 < self.update_probability <= 1:
-            raise OptionError(f"--update-probability {self.update_probability}: must be in (0, 1]")
+            raise OptionError(f"`update_probability` {self.update_probability}: must be in (0, 1]")
         if not 1 <= self.steps_per_frame <= 4096:
-            raise OptionError(f"--steps-per-frame {self.steps_per_frame}: must be from 1 to 4096")
+            raise OptionError(f"`steps_per_frame` {self.steps_per_frame}: must be from 1 to 4096")
         if not 0 <= self.reach <= 64:
-            raise OptionError(f"--reach {self.reach}: must be from 0 to 64 cells")
+            raise OptionError(f"`reach` {self.reach}: must be from 0 to 64 cells")
         if not all(0 < d < math.inf for d in (self.sobel_divisor, self.laplacian_divisor)):
-            raise OptionError("--sobel-divisor and --laplacian-divisor must be positive")
+            raise OptionError("`sobel_divisor` and `laplacian_divisor` must be positive")
 
     @property
     def inputs(self) -> int:

@@ -23,7 +23,7 @@ from vnca.core.errors import FileFormatError, OptionError, OutputError
 from vnca.core.files import existing_file, whole_file
 from vnca.core.typing import AnyArray, FloatArray
 from vnca.features.network import FeatureNetwork
-from vnca.training.config import CourseConfig
+from vnca.training.config import TrainingConfig
 from vnca.training.loop import Trainer
 from vnca.training.snapshot import Snapshot
 
@@ -140,7 +140,7 @@ class Checkpoint:
         if changed:
             raise OptionError(
                 f"{path}: the {' and the '.join(changed)} changed since this training began; put "
-                "back what was there, or train anew with --overwrite"
+                "back what was there, or train anew with `overwrite`"
             )
 
 
@@ -151,7 +151,7 @@ def _of_part(tensors: Mapping[str, Tensor], part: str) -> dict[str, Tensor]:
 
 def fingerprints(
     style: FloatArray,
-    config: CourseConfig,
+    config: TrainingConfig,
     network: FeatureNetwork,
     **others: Sequence[AnyArray | tuple[int, ...]],
 ) -> dict[str, str]:

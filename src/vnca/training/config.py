@@ -25,7 +25,7 @@ class PoolConfig:
 
     def __post_init__(self) -> None:
         if self.size < 1 or self.reseed_every < 1 or not self.limit > 0:
-            raise OptionError("--pool.size, --pool.reseed-every and --pool.limit must be positive")
+            raise OptionError("`pool.size`, `pool.reseed_every` and `pool.limit` must be positive")
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Pictures:
 
 
 @dataclass(frozen=True)
-class CourseConfig(ABC):
+class TrainingConfig(ABC):
     """How a rule is trained, on whatever it is trained."""
 
     rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = field(default_factory=RuleConfig)
@@ -77,25 +77,25 @@ class CourseConfig(ABC):
 
     def __post_init__(self) -> None:
         if self.iterations < 1:
-            raise OptionError(f"--iterations {self.iterations}: at least 1 is needed")
+            raise OptionError(f"`iterations` {self.iterations}: at least 1 is needed")
         if not (0 < self.learning_rate < inf and 0 < self.decay < inf):
-            raise OptionError("--learning-rate and --decay must be positive")
+            raise OptionError("`learning_rate` and `decay` must be positive")
         if self.rate_warmup < 0:
-            raise OptionError(f"--rate-warmup {self.rate_warmup}: must not be negative")
+            raise OptionError(f"`rate_warmup` {self.rate_warmup}: must not be negative")
         if not all(0 <= part <= 1 for part in self.milestones):
             raise OptionError(
-                f"--milestones {' '.join(map(str, self.milestones))}: expected parts of the "
+                f"`milestones` {' '.join(map(str, self.milestones))}: expected parts of the "
                 "iterations, from 0 to 1"
             )
         if not 1 <= self.shortest_rollout <= self.longest_rollout:
             raise OptionError(
-                f"--shortest-rollout {self.shortest_rollout}: must be from 1 to "
-                f"--longest-rollout ({self.longest_rollout})"
+                f"`shortest_rollout` {self.shortest_rollout}: must be from 1 to "
+                f"`longest_rollout` ({self.longest_rollout})"
             )
         if not 0 <= self.overflow < inf:
-            raise OptionError(f"--overflow {self.overflow}: must not be negative")
+            raise OptionError(f"`overflow` {self.overflow}: must not be negative")
         if not 0 <= self.seed < 2**63:
-            raise OptionError(f"--seed {self.seed}: must be from 0 to 2^63 - 1")
+            raise OptionError(f"`seed` {self.seed}: must be from 0 to 2^63 - 1")
 
     @property
     @abstractmethod

@@ -12,7 +12,7 @@ PATIENCE = 20
 at most; a pool hands out its seed several times in so many iterations."""
 KEEP_EVERY = 10
 """Iterations between weights that are kept to go back to."""
-MOST_RETREATS = 3
+MOST_ROLLBACKS = 3
 """How often the learning rate is halved before training is given up."""
 
 
@@ -26,7 +26,7 @@ class Descent:
 
     Attributes:
         kept_at: The iteration whose weights it would go back to.
-        retreats: How often it went back.
+        rollbacks: How often it went back.
     """
 
     def __init__(self, weights: Sequence[Tensor]) -> None:
@@ -36,17 +36,17 @@ class Descent:
         self._explosions = 0  # in a row
         self._kept = self._now()
         self.kept_at = 0
-        self.retreats = 0
+        self.rollbacks = 0
 
     @property
     def is_exhausted(self) -> bool:
         """Whether training diverged once more than it may."""
-        return self.retreats > MOST_RETREATS
+        return self.rollbacks > MOST_ROLLBACKS
 
     @property
     def slowdown(self) -> float:
-        """What the learning rate is multiplied by after the retreats so far."""
-        return 0.5**self.retreats
+        """What the learning rate is multiplied by after the rollbacks so far."""
+        return 0.5**self.rollbacks
 
     def step(self, loss: Tensor, rate: float, iteration: int, *, exploded: bool) -> bool:
         """One step down the gradient; False if training has diverged and went back instead.
@@ -63,7 +63,7 @@ class Descent:
         if not is_sound or not (has_learned or exploded) or self._explosions >= PATIENCE:
             self._write(self._kept)
             self._explosions = 0
-            self.retreats += 1
+            self.rollbacks += 1
             return False
         if not exploded and iteration % KEEP_EVERY == 0:
             self._kept, self.kept_at = self._now(), iteration
@@ -95,7 +95,7 @@ class Descent:
         values = {
             "explosions": self._explosions,
             "kept_at": self.kept_at,
-            "retreats": self.retreats,
+            "rollbacks": self.rollbacks,
         }
         return Snapshot(tensors, values)
 
@@ -116,7 +116,7 @@ class Descent:
         values = snapshot.values
         self._explosions = count(values["explosions"], "explosions", most=PATIENCE)
         self.kept_at = count(values["kept_at"], "kept_at")
-        self.retreats = count(values["retreats"], "retreats", most=MOST_RETREATS + 1)
+        self.rollbacks = count(values["rollbacks"], "rollbacks", most=MOST_ROLLBACKS + 1)
         self._write(now)
         self._kept = kept
 

@@ -20,8 +20,8 @@ from vnca.features.network import FeatureNetwork
 from vnca.losses.appearance import AppearanceLoss
 from vnca.losses.overflow import overflow
 from vnca.rule.rule import DENSITY_CHANGE, Rule
-from vnca.training.config import CourseConfig
-from vnca.training.descent import MOST_RETREATS, Descent
+from vnca.training.config import TrainingConfig
+from vnca.training.descent import MOST_ROLLBACKS, Descent
 from vnca.training.memory import states_to_keep
 from vnca.training.motion import MotionSupervision
 from vnca.training.pool import Pool
@@ -67,7 +67,7 @@ class Trainer:
         scene: Scene[Any],
         rule: Rule,
         style: FloatArray,
-        config: CourseConfig,
+        config: TrainingConfig,
         network: FeatureNetwork,
         *,
         motion: MotionSupervision | None = None,
@@ -177,9 +177,9 @@ class Trainer:
         self.undo()
         if self._descent.is_exhausted:
             raise DivergenceError(
-                f"training has diverged {MOST_RETREATS + 1} times, the last at iteration "
+                f"training has diverged {MOST_ROLLBACKS + 1} times, the last at iteration "
                 f"{self.iteration}, though the learning rate was halved each time; the weights of "
-                f"iteration {self.good_iteration} are kept: choose a --learning-rate far below "
+                f"iteration {self.good_iteration} are kept: choose a `learning_rate` far below "
                 f"{self.config.learning_rate:g}"
             )
         self._before = self.snapshot()
@@ -227,30 +227,30 @@ class Trainer:
 
     def _improve(self) -> Progress:
         config = self.config
-        place, before = self._pool.draw(self.iteration)
+        slot, before = self._pool.draw(self.iteration)
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
-        scene = self.scene.variant(place)
+        scene = self.scene.augmented(slot)
         state = self._roll(before, range(self._steps, self._steps + steps), scene)
         self._steps += steps
-        sight = scene.sight(self._random)
-        pictures, opacity = scene.pictures(state, sight, self.background)
+        viewpoint = scene.viewpoint(self._random)
+        pictures, opacity = scene.pictures(state, viewpoint, self.background)
         grey = None
         if config.appearance.shows_density:
-            grey = scene.density_pictures(state, sight, self.background)
+            grey = scene.density_pictures(state, viewpoint, self.background)
         appearance = self._appearance(pictures, opacity, self._generator, grey)
         others = {"overflow": config.overflow * self._overflow(state[:-1])}
         if self._motion is not None and before.any():  # a state of zeros has no texture to move
             others["motion"] = self._motion.loss(
-                place,
+                slot,
                 before,
                 pictures,
-                sight,
+                viewpoint,
                 self.background,
                 frames=steps / config.rule.steps_per_frame,
                 appearance=float(appearance.total.detach()),
             )
         loss = appearance.total + torch.stack([*others.values()]).sum()
-        kept = self._pool.put(place, state)
+        kept = self._pool.put(slot, state)
         rate = config.rate(self.iteration)
         self.iteration += 1
         went_on = self._descent.step(loss, rate, self.iteration, exploded=not kept)

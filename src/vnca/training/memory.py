@@ -10,7 +10,7 @@ from typing import Any
 import torch
 
 from vnca.core.errors import OptionError
-from vnca.training.config import CourseConfig
+from vnca.training.config import TrainingConfig
 from vnca.training.rollout import fewest_kept
 from vnca.training.scene import Scene
 
@@ -55,7 +55,7 @@ class MemoryNeeds:
         return self.pool + self.pictures + self.work
 
 
-def memory_needs(scene: Scene[Any], config: CourseConfig) -> MemoryNeeds:
+def memory_needs(scene: Scene[Any], config: TrainingConfig) -> MemoryNeeds:
     """About how much memory training takes on a scene."""
     cells, box = len(scene.domain), scene.domain.box
     state = cells * config.rule.channels * 4
@@ -72,7 +72,7 @@ def memory_needs(scene: Scene[Any], config: CourseConfig) -> MemoryNeeds:
     )
 
 
-def states_to_keep(scene: Scene[Any], config: CourseConfig, budget: int | None) -> float:
+def states_to_keep(scene: Scene[Any], config: TrainingConfig, budget: int | None) -> float:
     """How many states of a rollout may be kept at a time; infinity if memory is no matter.
 
     Args:
@@ -96,12 +96,12 @@ def states_to_keep(scene: Scene[Any], config: CourseConfig, budget: int | None) 
         return fewest
     least = used + MARGIN * (needs.beside_rollout + fewest * needs.state)
     raise OptionError(
-        f"--memory-budget {_size(budget)}: at least {_size(least)} are needed here: {_size(used)} "
+        f"`memory_budget` {_size(budget)}: at least {_size(least)} are needed here: {_size(used)} "
         f"are in use already, and training takes {_listed(needs, config, fewest)}"
     )
 
 
-def memory_advice(scene: Scene[Any], config: CourseConfig, kept: float) -> str:
+def memory_advice(scene: Scene[Any], config: TrainingConfig, kept: float) -> str:
     """What takes how much memory, and what would take less, in one line.
 
     `kept` is the number of states that rollouts may keep.
@@ -110,9 +110,9 @@ def memory_advice(scene: Scene[Any], config: CourseConfig, kept: float) -> str:
     kept, fewest = min(longest, kept), fewest_kept(longest)
     pool, pixels = max(1, config.pool.size // 2), max(32, seen.size // 2)
     savings = {
-        f"--pool.size {pool}": needs.pool * (1 - pool / config.pool.size),
-        "a --memory-budget": (kept - fewest) * needs.state,
-        f"--{seen.option} {pixels}": needs.pictures * (1 - (pixels / seen.size) ** 2),
+        f"`pool.size` {pool}": needs.pool * (1 - pool / config.pool.size),
+        "a `memory_budget`": (kept - fewest) * needs.state,
+        f"`{seen.option}` {pixels}": needs.pictures * (1 - (pixels / seen.size) ** 2),
     }
     best = max(savings, key=lambda option: savings[option])
     return (
@@ -131,7 +131,7 @@ def memory_budget(text: str) -> int | None:
         return None
     found = re.fullmatch(r"(\d+(?:\.\d+)?) ?([MGT]I?B)", text.upper())
     if found is None:
-        raise OptionError(f"--memory-budget {text}: expected auto, or a size such as 12GB or 800MB")
+        raise OptionError(f"`memory_budget` {text}: expected auto, or a size such as 12GB or 800MB")
     return round(float(found[1]) * _UNITS[found[2]])
 
 
@@ -178,12 +178,12 @@ def _number(path: Path, pattern: str) -> int | None:
     return int(found[1]) if found else None
 
 
-def _listed(needs: MemoryNeeds, config: CourseConfig, kept: float) -> str:
+def _listed(needs: MemoryNeeds, config: TrainingConfig, kept: float) -> str:
     """What takes how much memory if rollouts keep so many states."""
     taken = {
-        f"--pool.size {config.pool.size}": needs.pool,
-        f"--longest-rollout {config.longest_rollout}": kept * needs.state,
-        f"--{config.pictures.option} {config.pictures.size}": needs.pictures,
+        f"`pool.size` {config.pool.size}": needs.pool,
+        f"`longest_rollout` {config.longest_rollout}": kept * needs.state,
+        f"`{config.pictures.option}` {config.pictures.size}": needs.pictures,
         "the cells": needs.work,
     }
     return ", ".join(f"{what} about {_size(bytes_)}" for what, bytes_ in taken.items())

@@ -15,8 +15,8 @@ from torch import Tensor
 
 from vnca.features.flow import FlowNetwork
 from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss, supervised
-from vnca.losses.pixels import luminance
-from vnca.training.scenes.smoke import SmokeScene, SmokeSight
+from vnca.losses.pixels import luma
+from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
 from vnca.training.snapshot import Snapshot
 
 
@@ -37,10 +37,10 @@ class MotionSupervision:
 
     def loss(
         self,
-        place: int,
+        slot: int,
         before: Tensor,
         after: Tensor,
-        sight: SmokeSight,
+        viewpoint: SmokeViewpoint,
         background: Tensor,
         *,
         frames: float,
@@ -49,19 +49,19 @@ class MotionSupervision:
         """How the texture moved in a rollout, against how the smoke moves in that time, weighted.
 
         Args:
-            place: That of the state in the pool; in its variant of the scene the rollout was.
+            slot: That of the state in the pool; in its augmented of the scene the rollout was.
             before: The state at its start, `[n + 1, C]`.
             after: The picture of its end, sRGB `[1, 3, r, c]`; differentiable.
-            sight: Where the picture was taken from.
+            viewpoint: Where the picture was taken from.
             background: What is behind, linear RGB `[3]`.
             frames: Frames that pass in the rollout, n / N.
             appearance: The appearance loss of this iteration.
         """
-        scene = self._scene.variant(place)
+        scene = self._scene.augmented(slot)
         with torch.no_grad():
-            earlier, _ = scene.pictures(before, sight, background)
+            earlier, _ = scene.pictures(before, viewpoint, background)
         size = min(self.config.size, after.shape[-1])
-        target, opacity = scene.motion(before, sight, size)
+        target, opacity = scene.motion(before, viewpoint, size)
         motion = self.compare(earlier, after, target, opacity, frames=frames)
         return self.weighted(motion, appearance)
 
@@ -85,7 +85,7 @@ class MotionSupervision:
             opacity: Opacity of the same view `[s, s]`.
             frames: Frames that pass in the rollout, n / N.
         """
-        grey = (_shrunk(luminance(picture)[:, 0], target.shape[0]) for picture in (before, after))
+        grey = (_shrunk(luma(picture)[:, 0], target.shape[0]) for picture in (before, after))
         seen = self._network(*grey)[0].permute(1, 2, 0) / frames
         return compare_motion(seen, target, supervised(target, opacity, self.config))
 

@@ -21,24 +21,24 @@ class Pool:
         self._states: dict[int, Tensor] = {}  # those that are not the seed
 
     def draw(self, iteration: int) -> tuple[int, Tensor]:
-        """A random place in the pool and its state; every so many iterations, the seed again."""
-        place = int(self._random.integers(self._config.size))
+        """A random slot in the pool and its state; every so many iterations, the seed again."""
+        slot = int(self._random.integers(self._config.size))
         if iteration % self._config.reseed_every == 0:
-            self._states.pop(place, None)
-        return place, self._states.get(place, self._seed)
+            self._states.pop(slot, None)
+        return slot, self._states.get(slot, self._seed)
 
-    def put(self, place: int, state: Tensor) -> bool:
+    def put(self, slot: int, state: Tensor) -> bool:
         """Return a state; False if it had exploded and was replaced by the seed."""
         state = state.detach()
         if not self._is_sound(state):
-            self._states.pop(place, None)
+            self._states.pop(slot, None)
             return False
-        self._states[place] = state
+        self._states[slot] = state
         return True
 
     def snapshot(self) -> Snapshot:
-        """The states that are not the seed, by place; not copied, for none is ever changed."""
-        return Snapshot({str(place): state for place, state in self._states.items()})
+        """The states that are not the seed, by slot; not copied, for none is ever changed."""
+        return Snapshot({str(slot): state for slot, state in self._states.items()})
 
     def restore(self, snapshot: Snapshot) -> None:
         """Hold the states of a snapshot; which are drawn is up to the random stream.
@@ -48,8 +48,8 @@ class Pool:
         """
         states = {}
         for name, state in snapshot.tensors.items():
-            place = count(int(name), "place", most=self._config.size - 1)
-            states[place] = matched(state, self._seed, f"state {name}")
+            slot = count(int(name), "slot", most=self._config.size - 1)
+            states[slot] = matched(state, self._seed, f"state {name}")
             if not self._is_sound(state):
                 raise ValueError(f"state {name}: beyond the limit")
         self._states = states

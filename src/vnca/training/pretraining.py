@@ -8,7 +8,7 @@ on drawing them on smoke.
 import dataclasses
 
 from vnca.rule.rule import PRIORS, Rule
-from vnca.training.smoke_config import TrainConfig
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.texture_config import PRESETS, TextureConfig
 
 SHARES = {"draft": 4.0, "standard": 1.0, "paper": 0.0}
@@ -19,7 +19,7 @@ LARGEST_PICTURE = 128
 """Cells along the shorter side of the picture, at most: its patterns are to fit the block."""
 
 
-def beginning_config(config: TrainConfig, share: float, picture: float) -> TextureConfig | None:
+def pretraining_config(config: SmokeConfig, share: float, picture: float) -> TextureConfig | None:
     """How the texture is trained for a training on smoke, or None if it is not to be.
 
     Args:
@@ -49,7 +49,7 @@ def beginning_config(config: TrainConfig, share: float, picture: float) -> Textu
     )
 
 
-def deaf_to_priors(rule: Rule) -> Rule:
+def without_prior_weights(rule: Rule) -> Rule:
     """The rule with no weight on any prior: a texture has had none to learn what they mean."""
     hidden = rule.hidden.copy()
     hidden[:, -PRIORS:] = 0

@@ -19,12 +19,12 @@ def preview_sheet(trainer: Trainer, style: FloatArray) -> FloatArray:
     """
     state = trainer.grow(2 * trainer.config.longest_rollout)
     with torch.no_grad():
-        portraits = trainer.scene.portraits(state, SIZE)
-    return contact_sheet([[_square(style), *portraits]])
+        preview_views = trainer.scene.preview_views(state, SIZE)
+    return contact_sheet([[_square(style), *preview_views]])
 
 
 def _square(style: FloatArray) -> FloatArray:
-    """The middle of the style picture, as large as a portrait."""
+    """The middle of the style picture, as large as a preview_view."""
     rows, columns = style.shape[:2]
     side = min(rows, columns)
     top, left = (rows - side) // 2, (columns - side) // 2

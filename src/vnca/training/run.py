@@ -16,7 +16,7 @@ from vnca.core.typing import FloatArray
 from vnca.io.picture import write_image
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, Thrift
-from vnca.training.config import CourseConfig
+from vnca.training.config import TrainingConfig
 from vnca.training.curves import PATTERN, Curves
 from vnca.training.loop import Progress
 
@@ -48,12 +48,12 @@ class RunFolder:
             return
         if (self.path / CHECKPOINT_NAME).exists():
             raise OutputError(
-                f"{self.path}: holds a training that was interrupted; go on with --resume "
-                f"{self.path}, or choose another --out or --overwrite"
+                f"{self.path}: holds a training that was interrupted; go on with `resume` "
+                f"{self.path}, or choose another `out` or `overwrite`"
             )
         if (self.path / MODEL_NAME).exists():
             raise OutputError(
-                f"{self.path}: holds a trained model already; choose another --out or --overwrite"
+                f"{self.path}: holds a trained model already; choose another `out` or `overwrite`"
             )
 
     def __enter__(self) -> "RunFolder":
@@ -93,7 +93,7 @@ class RunFolder:
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
 
-    def start(self, config: CourseConfig, training: dict[str, Any]) -> None:
+    def start(self, config: TrainingConfig, training: dict[str, Any]) -> None:
         """Write what was asked for: resolved configuration, inputs, version and device."""
         previews = map(_PREVIEW.format, range(config.iterations + 1))
         remove_leftovers(self.path, {CONFIG_NAME, CHECKPOINT_NAME, MODEL_NAME, *previews})

@@ -10,11 +10,11 @@ from torch import Tensor
 from vnca.core.typing import FloatArray
 from vnca.engine.domain import Domain
 
-Sight = TypeVar("Sight")
+Viewpoint = TypeVar("Viewpoint")
 """Where a scene is looked at from, to look at several states alike."""
 
 
-class Scene(ABC, Generic[Sight]):
+class Scene(ABC, Generic[Viewpoint]):
     """Cells on which states are rolled out and looked at; nothing in it changes.
 
     Attributes:
@@ -47,36 +47,40 @@ class Scene(ABC, Generic[Sight]):
         field = values.new_zeros(int(np.prod(shape)), *values.shape[1:])
         return field.index_copy(0, self._places, values).view(*shape, *values.shape[1:])
 
-    def variant(self, place: int) -> "Scene[Sight]":
-        """The scene that the state at a place of the pool lives in, always the same cells."""
-        del place
+    def augmented(self, slot: int) -> "Scene[Viewpoint]":
+        """The scene that the state at a slot of the pool lives in, always the same cells."""
+        del slot
         return self
 
     @abstractmethod
-    def sight(self, random: np.random.Generator) -> Sight:
+    def viewpoint(self, random: np.random.Generator) -> Viewpoint:
         """Where to look from in an iteration, drawn at random."""
 
     @abstractmethod
-    def pictures(self, state: Tensor, sight: Sight, background: Tensor) -> tuple[Tensor, Tensor]:
+    def pictures(
+        self, state: Tensor, viewpoint: Viewpoint, background: Tensor
+    ) -> tuple[Tensor, Tensor]:
         """What a state shows, as the losses want it; differentiable in the state.
 
         Args:
             state: `[n + 1, C]`.
-            sight: Where to look from.
+            viewpoint: Where to look from.
             background: What is behind, linear RGB `[3]`.
 
         Returns:
             sRGB `[b, 3, r, c]` over the background, and opacity `[b, r, c]`.
         """
 
-    def density_pictures(self, state: Tensor, sight: Sight, background: Tensor) -> Tensor | None:
+    def density_pictures(
+        self, state: Tensor, viewpoint: Viewpoint, background: Tensor
+    ) -> Tensor | None:
         """The density that `pictures` shows coloured, in grey: sRGB `[b, 3, r, c]`.
 
         Differentiable in the state. None of a scene whose density is not painted.
         """
-        del state, sight, background
+        del state, viewpoint, background
         return None
 
     @abstractmethod
-    def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
+    def preview_views(self, state: Tensor, size: int) -> list[FloatArray]:
         """Pictures for people to look at, linear RGB `[size, size, 3]`, from where they expect."""

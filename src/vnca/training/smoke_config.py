@@ -9,7 +9,7 @@ from vnca.core.errors import OptionError
 from vnca.losses.appearance import AppearanceConfig
 from vnca.losses.motion import MotionConfig
 from vnca.rule.rule import RuleConfig
-from vnca.training.config import CourseConfig, Pictures, PoolConfig
+from vnca.training.config import Pictures, PoolConfig, TrainingConfig
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class ViewConfig:
     """Views come from up to this many degrees above or below the horizon."""
     step: float = 1.0
     """Distance between samples along a ray, cells."""
-    mode: Literal["sane", "paper"] = "sane"
+    mode: Literal["emission-absorption", "paper"] = "emission-absorption"
     """Integrand: emission and absorption, or the paper's as printed."""
     cell_opacity: float = 0.95
     """Without a given gamma, one is chosen that makes a typical cell this opaque: high shows the
@@ -35,23 +35,23 @@ class ViewConfig:
 
     def __post_init__(self) -> None:
         if self.size < 32:
-            raise OptionError(f"--view.size {self.size}: at least 32 pixels are needed")
+            raise OptionError(f"`view.size` {self.size}: at least 32 pixels are needed")
         if not all(-360 <= azimuth <= 360 for azimuth in self.azimuths):
             raise OptionError(
-                f"--view.azimuths {' '.join(map(str, self.azimuths))}: must be -360 to 360 degrees"
+                f"`view.azimuths` {' '.join(map(str, self.azimuths))}: must be -360 to 360 degrees"
             )
         if not 0 <= self.elevation <= 90:
-            raise OptionError(f"--view.elevation {self.elevation}: must be 0 to 90 degrees")
+            raise OptionError(f"`view.elevation` {self.elevation}: must be 0 to 90 degrees")
         if not 0 < self.step < inf:
-            raise OptionError(f"--view.step {self.step}: must be positive")
+            raise OptionError(f"`view.step` {self.step}: must be positive")
         if not 0 < self.cell_opacity < 1:
-            raise OptionError(f"--view.cell-opacity {self.cell_opacity}: must be between 0 and 1")
+            raise OptionError(f"`view.cell_opacity` {self.cell_opacity}: must be between 0 and 1")
         if self.gamma is not None and not 0 < self.gamma < inf:
-            raise OptionError(f"--view.gamma {self.gamma}: must be positive")
+            raise OptionError(f"`view.gamma` {self.gamma}: must be positive")
 
 
 @dataclass(frozen=True)
-class TrainConfig(CourseConfig):
+class SmokeConfig(TrainingConfig):
     """How a rule is trained on smoke."""
 
     motion: MotionConfig = field(default_factory=MotionConfig)
@@ -72,7 +72,7 @@ class TrainConfig(CourseConfig):
 _ANYWHERE = RuleConfig(sobel_divisor=8, position_prior=False)
 
 # About a pixel a cell: of finer detail comes grain.
-_DRAFT = TrainConfig(
+_DRAFT = SmokeConfig(
     iterations=250,
     learning_rate=1e-3,
     view=ViewConfig(size=96),
@@ -91,7 +91,7 @@ PRESETS = {
         rule=dataclasses.replace(_ANYWHERE, hidden=128),
         winds=True,
     ),
-    "paper": TrainConfig(
+    "paper": SmokeConfig(
         iterations=5000,
         learning_rate=1e-3,
         shortest_rollout=32,

@@ -15,13 +15,13 @@ from vnca.rule.rule import Rule, Scales, density_scale
 from vnca.training.loop import Trainer
 from vnca.training.motion import MotionSupervision
 from vnca.training.scenes.smoke import SmokeScene, velocity_scale
-from vnca.training.smoke_config import TrainConfig, ViewConfig
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 
 def smoke_trainer(
     smoke: Volume,
     style: FloatArray,
-    config: TrainConfig,
+    config: SmokeConfig,
     network: FeatureNetwork,
     *,
     device: torch.device | str = "cpu",
@@ -52,7 +52,7 @@ def smoke_trainer(
     return Trainer(scene, rule, style, config, network, motion=motion, memory_budget=memory_budget)
 
 
-def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:
+def choose_scales(smoke: Volume, config: SmokeConfig) -> Scales:
     """Normalisers from the frame a rule is trained on."""
     density = density_scale(smoke.density)
     return Scales(

@@ -10,7 +10,7 @@ from vnca.core.errors import OptionError
 from vnca.losses.appearance import AppearanceConfig
 from vnca.painting.block import LARGEST, SMALLEST
 from vnca.rule.rule import RuleConfig
-from vnca.training.config import CourseConfig, Pictures, PoolConfig
+from vnca.training.config import Pictures, PoolConfig, TrainingConfig
 
 
 @dataclass(frozen=True)
@@ -30,14 +30,14 @@ class SliceConfig:
 
     def __post_init__(self) -> None:
         if self.size < 32:
-            raise OptionError(f"--slice.size {self.size}: at least 32 pixels are needed")
+            raise OptionError(f"`slice.size` {self.size}: at least 32 pixels are needed")
         if self.count < 1:
-            raise OptionError(f"--slice.count {self.count}: at least 1 is needed")
+            raise OptionError(f"`slice.count` {self.count}: at least 1 is needed")
         for name in ("oblique", "mesh"):
             if not 0 <= getattr(self, name) <= 1:
-                raise OptionError(f"--slice.{name} {getattr(self, name)}: must be from 0 to 1")
+                raise OptionError(f"`slice.{name}` {getattr(self, name)}: must be from 0 to 1")
         if not 1 <= self.zoom <= 4:
-            raise OptionError(f"--slice.zoom {self.zoom}: must be from 1 to 4")
+            raise OptionError(f"`slice.zoom` {self.zoom}: must be from 1 to 4")
 
 
 # A texture is the same everywhere and follows nothing. Only gradients tell a cell where in a
@@ -50,7 +50,7 @@ _COLOURS = AppearanceConfig(grey=False, samples=512)
 
 
 @dataclass(frozen=True)
-class TextureConfig(CourseConfig):
+class TextureConfig(TrainingConfig):
     """How a rule for a solid texture is trained."""
 
     rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = _PLAIN
@@ -70,12 +70,12 @@ class TextureConfig(CourseConfig):
         rule = self.rule
         if rule.position_prior or rule.density_prior or rule.velocity_prior:
             raise OptionError(
-                "--position-prior, --density-prior, --velocity-prior: a solid texture has none"
+                "`position_prior`, `density_prior`, `velocity_prior`: a solid texture has none"
             )
         if self.appearance.shows_density:
-            raise OptionError("--appearance.grey-source density: a solid texture has no density")
+            raise OptionError("`appearance.grey_source` density: a solid texture has no density")
         if not SMALLEST <= self.block <= LARGEST:
-            raise OptionError(f"--block {self.block}: must be from {SMALLEST} to {LARGEST} cells")
+            raise OptionError(f"`block` {self.block}: must be from {SMALLEST} to {LARGEST} cells")
 
     @property
     def pictures(self) -> Pictures:

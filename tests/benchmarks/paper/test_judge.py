@@ -58,11 +58,11 @@ def test_unpainted_smoke_is_white_and_as_dense_as_it_was(tiny_smoke: Volume, rul
 
 def test_a_portrait_shows_what_is_painted(judge: Judge, tiny_smoke: Volume, rule: Rule) -> None:
     blue = coloured(rule, 0.9)
-    portrait = judge.portrait(paint(blue, tiny_smoke), blue)
-    middle = portrait[len(portrait) // 2, len(portrait) // 2]
+    preview_view = judge.preview_view(paint(blue, tiny_smoke), blue)
+    middle = preview_view[len(preview_view) // 2, len(preview_view) // 2]
     expected = srgb_to_linear(np.array([0.5, 0.5, 0.9]))
     np.testing.assert_allclose(middle, expected, atol=0.01)
-    assert portrait[0, 0].max() < 0.02
+    assert preview_view[0, 0].max() < 0.02
 
 
 def test_more_extinction_is_more_opaque(judge: Judge, tiny_smoke: Volume, rule: Rule) -> None:

@@ -279,7 +279,7 @@ def test_the_frame_kept_with_the_tests_is_bit_identical_to_openvdb(
 
 def test_velocity_in_a_frustum_is_named_with_the_way_out(written_by_openvdb: Path) -> None:
     path = written_by_openvdb / "wind_bent.vdb"
-    with pytest.raises(GridError, match=r"grid 'vel' has a Non.*FrustumMap.* --velocity-grid none"):
+    with pytest.raises(GridError, match=r"grid 'vel' has a Non.*FrustumMap.* `velocity_grid` none"):
         read_smoke(path, SmokeFormat())
     assert read_smoke(path, SmokeFormat(velocity_grid="none")).velocity is None
 

@@ -68,5 +68,5 @@ def test_what_would_come_too_late_is_said_before_training(tmp_path: Path, monkey
     with pytest.raises(OutputError, match="name a file"):
         train(FlowTraining(tmp_path))
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    with pytest.raises(BackendUnavailableError, match="use --device cpu"):
+    with pytest.raises(BackendUnavailableError, match="use `device` cpu"):
         train(FlowTraining(tmp_path / "flow.safetensors", device="cuda"))

@@ -8,7 +8,7 @@ import torch
 from vnca.core.errors import GridError
 from vnca.core.typing import Box
 from vnca.core.volume import Volume
-from vnca.rule.conditioning import told_velocity
+from vnca.rule.conditioning import normalised_velocity
 from vnca.rule.rule import Rule, RuleConfig, Scales, density_scale
 from vnca.training.scenes.smoke import (
     DENSEST,
@@ -19,7 +19,7 @@ from vnca.training.scenes.smoke import (
     velocity_scale,
     view_width,
 )
-from vnca.training.smoke_config import TrainConfig, ViewConfig
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 from vnca.training.smoke_trainer import choose_scales
 
 WINDY = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(velocity=2.0), seed=0)
@@ -55,10 +55,10 @@ def test_the_velocity_that_counts_as_one_is_the_rms_speed_in_the_smoke() -> None
 
 
 def test_a_given_gamma_and_the_units_of_the_file_are_kept_apart(tiny_smoke: Volume) -> None:
-    config = TrainConfig(view=ViewConfig(gamma=0.25))
+    config = SmokeConfig(view=ViewConfig(gamma=0.25))
     assert choose_scales(tiny_smoke, config).gamma == 0.25
     bright = replace(tiny_smoke, density=50 * tiny_smoke.density)
-    plain, scaled = (choose_scales(s, TrainConfig()) for s in (tiny_smoke, bright))
+    plain, scaled = (choose_scales(s, SmokeConfig()) for s in (tiny_smoke, bright))
     assert scaled.density == pytest.approx(50 * plain.density)
     assert scaled.gamma == pytest.approx(plain.gamma, rel=1e-4)
 
@@ -132,7 +132,7 @@ def lying(smoke: Volume, way: int) -> Volume:
 def test_views_are_of_the_world_however_cells_are_counted(
     tiny_smoke: Volume, way: int, azimuth: float
 ) -> None:
-    """A mirrored, turned or uneven grid shows the same smoke in the same place."""
+    """A mirrored, turned or uneven grid shows the same smoke in the same slot."""
     shape = (12, 14, 10)
     density = np.zeros(shape, np.float32)
     density[2:10, 3:12, 1:6], density[5:7, 5:9, 5:9] = 1, 1  # no symmetry
@@ -142,9 +142,10 @@ def test_views_are_of_the_world_however_cells_are_counted(
     views = [s.look(s.seed(4), s.camera(azimuth, 20)) for s in (one, other)]
     assert float(views[0].opacity.mean()) > 0.2
     torch.testing.assert_close(views[0].opacity, views[1].opacity, atol=1e-3, rtol=0)
-    sights = [s.sight(np.random.default_rng(1)) for s in (one, other)]
+    viewpoints = [s.viewpoint(np.random.default_rng(1)) for s in (one, other)]
     motions = [
-        s.motion(s.seed(4), sight, 32) for s, sight in zip((one, other), sights, strict=True)
+        s.motion(s.seed(4), viewpoint, 32)
+        for s, viewpoint in zip((one, other), viewpoints, strict=True)
     ]
     torch.testing.assert_close(motions[0][0], motions[1][0], atol=1e-3, rtol=1e-3)
 
@@ -166,7 +167,7 @@ def test_smoke_on_uneven_cells_is_as_high_and_as_opaque_as_in_the_world(tiny_smo
 def angles(there: SmokeScene, count: int = 40) -> set[tuple[float, float]]:
     """Azimuths and elevations that training looks from."""
     random = np.random.default_rng(0)
-    cameras: list[Any] = [there.sight(random).camera for _ in range(count)]
+    cameras: list[Any] = [there.viewpoint(random).camera for _ in range(count)]
     return {(camera.azimuth, camera.elevation) for camera in cameras}
 
 
@@ -197,7 +198,7 @@ def test_a_look_is_differentiable_in_what_is_shown_only(tiny_smoke: Volume) -> N
 def test_a_wind_turns_all_of_the_velocity_alike_and_carries_it_along(tiny_smoke: Volume) -> None:
     windy = in_winds(tiny_smoke)
     before = windy.velocity.clone(), windy.priors.clone()
-    blown, other = windy.variant(3), windy.variant(5)
+    blown, other = windy.augmented(3), windy.augmented(5)
     # Among cells, velocities differ as they did, turned and scaled.
     own, new = (s.velocity.numpy().astype(float) for s in (windy, blown))
     affine, *_ = np.linalg.lstsq(np.c_[own, np.ones(len(own))], new, rcond=None)
@@ -206,7 +207,7 @@ def test_a_wind_turns_all_of_the_velocity_alike_and_carries_it_along(tiny_smoke:
     assert SPEEDS[0] <= factor <= SPEEDS[1]
     np.testing.assert_allclose(affine[:3] @ affine[:3].T, factor**2 * np.eye(3), atol=1e-4)
     assert 0 < np.linalg.norm(affine[3]) <= STRONGEST * WINDY.scales.velocity
-    assert torch.equal(windy.variant(3).velocity, blown.velocity)
+    assert torch.equal(windy.augmented(3).velocity, blown.velocity)
     assert not torch.allclose(other.velocity, blown.velocity)
     assert torch.equal(windy.velocity, before[0])
     assert torch.equal(windy.priors, before[1])
@@ -214,17 +215,17 @@ def test_a_wind_turns_all_of_the_velocity_alike_and_carries_it_along(tiny_smoke:
 
 def test_even_places_move_as_the_smoke_does_but_slower_or_faster(tiny_smoke: Volume) -> None:
     windy = in_winds(tiny_smoke)
-    speed, speeds = (s.velocity.norm(dim=-1) for s in (windy, windy.variant(4)))
+    speed, speeds = (s.velocity.norm(dim=-1) for s in (windy, windy.augmented(4)))
     factors = speeds[speed > 0] / speed[speed > 0]
     torch.testing.assert_close(factors, factors[:1].expand_as(factors))
     assert SPEEDS[0] <= float(factors[0]) <= SPEEDS[1]
-    torch.testing.assert_close(windy.variant(4).velocity, windy.velocity * factors[0])
+    torch.testing.assert_close(windy.augmented(4).velocity, windy.velocity * factors[0])
 
 
 def test_the_rule_is_told_the_wind_and_another_density_than_is_seen(tiny_smoke: Volume) -> None:
     windy = in_winds(tiny_smoke)
-    blown = windy.variant(3)
-    told = torch.from_numpy(told_velocity(blown.velocity.numpy(), WINDY))
+    blown = windy.augmented(3)
+    told = torch.from_numpy(normalised_velocity(blown.velocity.numpy(), WINDY))
     assert torch.equal(blown.priors[:, 4:], told)
     assert torch.equal(blown.priors[:, :3], windy.priors[:, :3])
     thin, dense = windy.priors[:, 3], blown.priors[:, 3]
@@ -239,14 +240,14 @@ def test_no_more_density_is_told_in_training_than_in_painting(tiny_smoke: Volume
     windy = in_winds(steep)
     seen = windy._density
     assert seen.max() > 5
-    for place in range(12):
-        told = windy.variant(place).priors[:, 3]
+    for slot in range(12):
+        told = windy.augmented(slot).priors[:, 3]
         assert told.max() <= 4
         thin = told < 4
         factor = (told / seen)[thin & (seen > 0)]
         torch.testing.assert_close(factor, factor[:1].expand_as(factor))
         torch.testing.assert_close(told, (factor[0] * seen).clamp_max(4))
-    assert not in_winds(steep, without_density()).variant(3).priors[:, 3].any()
+    assert not in_winds(steep, without_density()).augmented(3).priors[:, 3].any()
 
 
 def without_density() -> Rule:
@@ -255,16 +256,16 @@ def without_density() -> Rule:
 
 def test_a_rule_that_is_told_no_velocity_is_told_no_wind(tiny_smoke: Volume) -> None:
     deaf = Rule.initial(replace(WINDY.config, velocity_prior=False), Scales(), seed=0)
-    blown = in_winds(tiny_smoke, deaf).variant(3)
+    blown = in_winds(tiny_smoke, deaf).augmented(3)
     assert blown.velocity.any()
     assert not blown.priors[:, 4:].any()
 
 
 def test_without_winds_all_places_are_the_same(tiny_smoke: Volume) -> None:
     calm = scene(tiny_smoke)
-    assert calm.variant(3) is calm
+    assert calm.augmented(3) is calm
 
 
 def test_no_wind_blows_where_nothing_moves(tiny_smoke: Volume) -> None:
     still = in_winds(replace(tiny_smoke, velocity=None))
-    assert still.variant(3) is still
+    assert still.augmented(3) is still

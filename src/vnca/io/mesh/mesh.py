@@ -106,7 +106,7 @@ def read_mesh(path: Path, up: UpAxis | None = None) -> Mesh:
     up = up or _UP[suffix]
     if suffix == ".glb":
         if up != "y":
-            raise OptionError(f"--up-axis {up}: {path} is a GLB file, where up is always y")
+            raise OptionError(f"`up_axis` {up}: {path} is a GLB file, where up is always y")
         glb = Glb.read(path)
         decompress(glb)
     else:

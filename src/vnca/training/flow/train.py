@@ -60,7 +60,7 @@ def train(options: FlowTraining, report: Callable[[str], None] = print) -> FlowN
     """
     writable_file(options.out)
     if options.device == "cuda" and not torch.cuda.is_available():
-        raise BackendUnavailableError("--device cuda: no usable GPU was found; use --device cpu")
+        raise BackendUnavailableError("`device` cuda: no usable GPU was found; use `device` cpu")
     device = torch.device(options.device)
     torch.manual_seed(options.seed)
     random = Generator(device).manual_seed(options.seed)

@@ -15,12 +15,12 @@ from vnca.core.errors import GridError
 from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
-from vnca.losses.pixels import luminance
+from vnca.losses.pixels import luma
 from vnca.rendering.brightness import gamma_for_own_colour
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
 from vnca.rendering.velocity import projected_velocity
 from vnca.rendering.view import View, render
-from vnca.rule.conditioning import DENSITY, VELOCITY, priors, told_velocity
+from vnca.rule.conditioning import DENSITY, VELOCITY, normalised_velocity, priors
 from vnca.rule.conditioning import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
 from vnca.rule.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
 from vnca.training.scene import Scene
@@ -32,17 +32,17 @@ STRONGEST = 1.5
 """The strongest wind that carries all of the smoke along, in units of the smoke's typical speed."""
 DENSEST = 2.0
 """How much denser, or thinner, than it is the rule is told that it is, at most."""
-PORTRAITS = ((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (30.0, 60.0))
+PREVIEW_VIEWS = ((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (30.0, 60.0))
 """Azimuth and elevation: front, right, back and from above, degrees."""
-PORTRAIT_STEP = 0.5
+PREVIEW_STEP = 0.5
 """Distance between samples along a ray, cells: finer than in training, without terraces."""
-PORTRAIT_BACKGROUND = 0.01
+PREVIEW_BACKGROUND = 0.01
 """Linear grey behind the smoke."""
 _UPRIGHT = 1e-6
 """Cells turned and stretched by less than this are upright cubes."""
 
 
-class SmokeSight(NamedTuple):
+class SmokeViewpoint(NamedTuple):
     """Where smoke is looked at from.
 
     Attributes:
@@ -54,12 +54,12 @@ class SmokeSight(NamedTuple):
     offset: float
 
 
-class SmokeScene(Scene[SmokeSight]):
+class SmokeScene(Scene[SmokeViewpoint]):
     """A frame of smoke on which states are rolled out and looked at; nothing in it changes.
 
     Attributes:
         view: How it is looked at.
-        winds: Whether its velocity, and the density told, are others in each variant.
+        winds: Whether its velocity, and the density told, are others in each augmented.
         box: The cells that hold smoke lie in it.
         velocity: `[n, 3]`, cells per frame.
         moves: Whether the smoke has any.
@@ -80,7 +80,7 @@ class SmokeScene(Scene[SmokeSight]):
             smoke: The frame; must hold smoke.
             rule: Its normalisers and switches are used, not its weights.
             view: How it is looked at; gamma is the rule's.
-            winds: Whether its velocity, and the density told, are others in each variant.
+            winds: Whether its velocity, and the density told, are others in each augmented.
             device: Where rollouts and pictures are computed.
 
         Raises:
@@ -116,8 +116,8 @@ class SmokeScene(Scene[SmokeSight]):
         self.velocity = torch.from_numpy(velocity).to(device)
         self._rule = rule
 
-    def variant(self, place: int) -> "SmokeScene":
-        """The smoke in the wind of a place: faster or slower, and told to be denser or thinner.
+    def augmented(self, slot: int) -> "SmokeScene":
+        """The smoke in the wind of a slot: faster or slower, and told to be denser or thinner.
 
         At odd places its velocity is turned at random, too, and all of it carried along one way.
         The rule is told the velocity of the wind, and motion is judged by it; the density that is
@@ -125,15 +125,15 @@ class SmokeScene(Scene[SmokeSight]):
         """
         if not (self.winds and self.moves):
             return self
-        random = np.random.default_rng(place)
+        random = np.random.default_rng(slot)
         velocity = self.velocity.cpu().numpy() * random.uniform(*SPEEDS)
         denser = DENSEST ** random.uniform(-1, 1)
-        if place % 2:
+        if slot % 2:
             turn, heading = Rotation.from_quat(random.standard_normal((2, 4))).as_matrix()
             strength = random.uniform(0, STRONGEST) * self._rule.scales.velocity
             velocity = velocity @ turn + strength * heading[0]
         velocity = velocity.astype(np.float32)
-        told = torch.from_numpy(told_velocity(velocity, self._rule))
+        told = torch.from_numpy(normalised_velocity(velocity, self._rule))
         scene = copy.copy(self)
         scene.velocity = torch.from_numpy(velocity).to(self.velocity)
         scene.priors = self.priors.clone()
@@ -157,25 +157,27 @@ class SmokeScene(Scene[SmokeSight]):
         lower, upper = (np.asarray(c) - self.domain.box.lower - 0.5 for c in self.box)
         return _around(lower, upper, self._place)
 
-    def sight(self, random: np.random.Generator) -> SmokeSight:
+    def viewpoint(self, random: np.random.Generator) -> SmokeViewpoint:
         """A camera around the smoke, and where along the rays sampling begins."""
         azimuths = self.view.azimuths
         azimuth = float(random.choice(azimuths)) if azimuths else random.uniform(0, 360)
         elevation = random.uniform(-self.view.elevation, self.view.elevation)
         camera = _level_turntable(*self._corners, azimuth, elevation)
         # Samples at random depths: no pattern can hide between them.
-        offset = float(random.uniform()) if self.view.mode == "sane" else 0.0
-        return SmokeSight(camera, offset)
+        offset = float(random.uniform()) if self.view.mode == "emission-absorption" else 0.0
+        return SmokeViewpoint(camera, offset)
 
     def pictures(
-        self, state: Tensor, sight: SmokeSight, background: Tensor
+        self, state: Tensor, viewpoint: SmokeViewpoint, background: Tensor
     ) -> tuple[Tensor, Tensor]:
         """A view, as `Scene.pictures` has it."""
-        view = self.look(state, sight.camera, offset=sight.offset)
+        view = self.look(state, viewpoint.camera, offset=viewpoint.offset)
         picture = linear_to_srgb(view.over(background))
         return picture.permute(2, 0, 1)[None], view.opacity[None]
 
-    def density_pictures(self, state: Tensor, sight: SmokeSight, background: Tensor) -> Tensor:
+    def density_pictures(
+        self, state: Tensor, viewpoint: SmokeViewpoint, background: Tensor
+    ) -> Tensor:
         """The density in grey, as `Scene.density_pictures` has it.
 
         I = Σ d' τ over the cells of a ray, by the paper's integrand whatever that of the colours:
@@ -187,26 +189,26 @@ class SmokeScene(Scene[SmokeSight]):
         view = render(
             density,
             density.new_ones(1).expand(*density.shape, 3),
-            sight.camera,
+            viewpoint.camera,
             rows=self.view.size,
             columns=self.view.size,
             gamma=self._grey_gamma,
-            offset=sight.offset,
+            offset=viewpoint.offset,
             mode="paper",
             cells_to_world=self._place,
         )
-        behind = srgb_to_linear(luminance(linear_to_srgb(background).view(1, 3, 1, 1))).view(3)
+        behind = srgb_to_linear(luma(linear_to_srgb(background).view(1, 3, 1, 1))).view(3)
         return linear_to_srgb(view.over(behind)).permute(2, 0, 1)[None]
 
-    def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
+    def preview_views(self, state: Tensor, size: int) -> list[FloatArray]:
         """Views from the front, the right, the back and above."""
         view = dataclasses.replace(self.view, size=size)
-        if view.mode == "sane":
-            view = dataclasses.replace(view, step=PORTRAIT_STEP)
+        if view.mode == "emission-absorption":
+            view = dataclasses.replace(view, step=PREVIEW_STEP)
         pictures = []
-        for azimuth, elevation in PORTRAITS:
+        for azimuth, elevation in PREVIEW_VIEWS:
             seen = self.look(state, self.camera(azimuth, elevation), view)
-            pictures.append(seen.over([PORTRAIT_BACKGROUND] * 3).clamp(0, 1).cpu().numpy())
+            pictures.append(seen.over([PREVIEW_BACKGROUND] * 3).clamp(0, 1).cpu().numpy())
         return pictures
 
     def look(
@@ -231,7 +233,7 @@ class SmokeScene(Scene[SmokeSight]):
             cells_to_world=self._place,
         )
 
-    def motion(self, state: Tensor, sight: SmokeSight, size: int) -> tuple[Tensor, Tensor]:
+    def motion(self, state: Tensor, viewpoint: SmokeViewpoint, size: int) -> tuple[Tensor, Tensor]:
         """How the smoke that `pictures` shows moves: pixels per frame `[r, c, 2]`, and opacity.
 
         `size` is that of such a picture, rows and columns.
@@ -239,12 +241,12 @@ class SmokeScene(Scene[SmokeSight]):
         return projected_velocity(
             self._painted_density(state),
             self.dense(self.velocity),
-            sight.camera,
+            viewpoint.camera,
             rows=size,
             columns=size,
             gamma=self.gamma,
             step=self.view.step,
-            offset=sight.offset,
+            offset=viewpoint.offset,
             mode=self.view.mode,
             cells_to_world=self._place,
         )
@@ -268,17 +270,17 @@ def _stood(index_to_world: AnyArray) -> AnyArray | None:
     linear = index_to_world[:3, :3] / np.cbrt(abs(np.linalg.det(index_to_world[:3, :3])))
     if np.allclose(linear, np.eye(3), rtol=0, atol=_UPRIGHT):
         return None
-    place = np.eye(4)
-    place[:3, :3] = linear
-    return place
+    slot = np.eye(4)
+    slot[:3, :3] = linear
+    return slot
 
 
 def _around(
-    lower: AnyArray, upper: AnyArray, place: AnyArray | None
+    lower: AnyArray, upper: AnyArray, slot: AnyArray | None
 ) -> tuple[list[float], list[float]]:
     """The box around cells, where cameras are."""
-    if place is not None:
-        lower, upper = world_box(lower, upper, place)
+    if slot is not None:
+        lower, upper = world_box(lower, upper, slot)
     return lower.tolist(), upper.tolist()
 
 

@@ -28,10 +28,10 @@ from vnca.training.texture_config import SliceConfig
 
 MESH_VIEWS = 24
 """Views of the mesh that training chooses from."""
-PORTRAITS: tuple[Angles, ...] = ((0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (45.0, DIAGONAL))
+PREVIEW_VIEWS: tuple[Angles, ...] = ((0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (45.0, DIAGONAL))
 """From the front, the right and above, and across a diagonal, which training never does."""
 SPACING = 0.5
-"""Cells a pixel of a portrait shows."""
+"""Cells a pixel of a preview_view shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +97,17 @@ class BlockScene(Scene[list[Cut]]):
         """Linear RGB `[x, y, z, 3]` of a state; differentiable."""
         return self.dense(srgb_to_linear((state[:-1, COLOUR] + 0.5).clamp(0, 1)))
 
-    def sight(self, random: np.random.Generator) -> list[Cut]:
+    def viewpoint(self, random: np.random.Generator) -> list[Cut]:
         """Random slices, or views of the mesh."""
         return [self._cut(random) for _ in range(self.slices.count)]
 
     def pictures(
-        self, state: Tensor, sight: list[Cut], background: Tensor
+        self, state: Tensor, viewpoint: list[Cut], background: Tensor
     ) -> tuple[Tensor, Tensor]:
         """The slices and views, as `Scene.pictures` has it."""
         block, size = self.block(state), self.slices.size
         colours, opacities = [], []
-        for points, covered in sight:
+        for points, covered in viewpoint:
             colour, opacity = shown(block, points), block.new_ones(size, size)
             if covered is not None:
                 colour = background.expand(size, size, 3).index_put((covered,), colour)
@@ -116,7 +116,7 @@ class BlockScene(Scene[list[Cut]]):
             opacities.append(opacity)
         return torch.cat(colours), torch.stack(opacities)
 
-    def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
+    def preview_views(self, state: Tensor, size: int) -> list[FloatArray]:
         """Slices from the front, the right and above, and across a diagonal."""
         block = self.block(state)
         middle = np.full(3, len(block) / 2)
@@ -124,7 +124,7 @@ class BlockScene(Scene[list[Cut]]):
             shown(block, slice_points(angles, middle, size=size, spacing=SPACING).to(block.device))
             .cpu()
             .numpy()
-            for angles in PORTRAITS
+            for angles in PREVIEW_VIEWS
         ]
 
     def _cut(self, random: np.random.Generator) -> Cut:

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <vector>
 
-#include "crew.hpp"
+#include "thread_pool.hpp"
 #include "floats.hpp"
 #include "processor.hpp"
 #include "ranges.hpp"
@@ -165,7 +165,7 @@ bool decode(const DecodeKernel& kernel, const Decoder& decoder, const PointSourc
     for (int t = 0; t < threads; ++t) scratch.emplace_back(sizes.scratch);
     std::atomic<bool> valid = true;
 
-    Crew::of_process().run(ranges.count, threads, [&](int range, int worker) {
+    ThreadPool::of_process().run(ranges.count, threads, [&](int range, int worker) {
         const auto visit = [&](std::int64_t begin, const Points& points) {
             kernel.forward(decoder, packed.data(), points, scratch[worker].data(),
                            out + begin * SHOWN);
@@ -193,9 +193,9 @@ bool decode_backward(const DecodeKernel& kernel, const Decoder& decoder, const P
     Floats weights(std::max(1, ranges.count) * sizes.gradient);
     std::vector<Spill> spills(ranges.count);
     std::atomic<bool> valid = true;
-    Crew& crew = Crew::of_process();
+    ThreadPool& thread_pool = ThreadPool::of_process();
 
-    crew.run(ranges.count, threads, [&](int range, int worker) {
+    thread_pool.run(ranges.count, threads, [&](int range, int worker) {
         Gathering& gathering = gatherings[worker];
         const auto visit = [&](std::int64_t begin, Points& points) {
             gathering.give_slots(points);
@@ -209,7 +209,7 @@ bool decode_backward(const DecodeKernel& kernel, const Decoder& decoder, const P
     });
     if (!valid) return false;
 
-    crew.run(owners.count, threads, [&](int owner, int) {
+    thread_pool.run(owners.count, threads, [&](int owner, int) {
         std::fill(to.state + owners.begin(owner) * channels, to.state + owners.end(owner) * channels,
                   0.0f);
         for (const Spill& spill : spills) spill.add_to(to.state, channels, owner);

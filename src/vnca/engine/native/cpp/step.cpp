@@ -5,7 +5,7 @@
 #include <cstring>
 #include <vector>
 
-#include "crew.hpp"
+#include "thread_pool.hpp"
 #include "floats.hpp"
 #include "processor.hpp"
 #include "ranges.hpp"
@@ -149,7 +149,7 @@ bool forward(const Kernel& kernel, const Step& step, Rows rows, float* out, int 
     for (int t = 0; t < threads; ++t) scratch.emplace_back(sizes.scratch);
     std::atomic<bool> valid = true;
 
-    Crew::of_process().run(ranges.count, threads, [&](int range, int worker) {
+    ThreadPool::of_process().run(ranges.count, threads, [&](int range, int worker) {
         const std::int64_t begin = ranges.begin(range), end = ranges.end(range);
         std::memcpy(out + begin * step.channels, step.state + begin * step.channels,
                     (end - begin) * step.channels * sizeof(float));
@@ -180,9 +180,9 @@ bool backward(const Kernel& kernel, const Step& step, Rows rows, const float* gr
     Floats weights(std::max(1, ranges.count) * sizes.gradient());
     std::vector<Spill> spills(ranges.count);
     std::atomic<bool> valid = true;
-    Crew& crew = Crew::of_process();
+    ThreadPool& thread_pool = ThreadPool::of_process();
 
-    crew.run(ranges.count, threads, [&](int range, int worker) {
+    thread_pool.run(ranges.count, threads, [&](int range, int worker) {
         Gathering& gathering = gatherings[worker];
         float* const to_weights = weights.data() + range * sizes.gradient();
         gathering.start(ranges.begin(range), ranges.end(range));
@@ -196,7 +196,7 @@ bool backward(const Kernel& kernel, const Step& step, Rows rows, const float* gr
     });
     if (!valid) return false;
 
-    crew.run(ranges.count, threads, [&](int range, int) {
+    thread_pool.run(ranges.count, threads, [&](int range, int) {
         for (const Spill& spill : spills) spill.add_to(to.state, channels, range);
     });
     std::fill_n(to.state + step.cells * channels, channels, 0.0f);

@@ -11,8 +11,8 @@ from vnca.core.typing import Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.session import Compute
 from vnca.io.orientation import on_one_lattice
-from vnca.metrics.stage import SIZE, Coloured, Pair, Sight, Stage
-from vnca.metrics.style import StyleDistances, StyleGauge, gap_closed, mean_distances
+from vnca.metrics.setup import SIZE, Coloured, Pair, Setup, Viewpoint
+from vnca.metrics.style import StyleDistances, StyleMetric, gap_closed, mean_distances
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import stylize
 from vnca.rule.rule import Rule
@@ -21,22 +21,22 @@ FEWEST_OPAQUE = 64
 """Opaque pixels without which a view says nothing about style."""
 CUTOUTS = 3
 """Cut-outs of the picture for each view."""
-SIDES = tuple(Sight(azimuth, 10.0) for azimuth in (0.0, 90.0, 180.0, 270.0))
+SIDES = tuple(Viewpoint(azimuth, 10.0) for azimuth in (0.0, 90.0, 180.0, 270.0))
 """From where frames of a sequence are compared with the picture."""
 
 
 @dataclass(frozen=True, eq=False)
-class Likeness:
+class StyleScore:
     """How far views are from the style picture, and what that is to be compared with.
 
     Attributes:
-        sights: Where each view was taken from.
+        viewpoints: Where each view was taken from.
         painted: The distance of each view of the painting.
         plain: The mean distance of the same smoke as it comes.
         cutout: The mean distance of parts of the picture in the shape of the smoke.
     """
 
-    sights: tuple[Sight, ...]
+    viewpoints: tuple[Viewpoint, ...]
     painted: tuple[StyleDistances, ...]
     plain: StyleDistances
     cutout: StyleDistances
@@ -74,7 +74,7 @@ class Likeness:
         }
 
 
-def joined_likeness(parts: Iterable[Likeness | None]) -> Likeness:
+def joined_style_score(parts: Iterable[StyleScore | None]) -> StyleScore:
     """That of the views of several frames, of which each has about as many.
 
     Raises:
@@ -84,17 +84,17 @@ def joined_likeness(parts: Iterable[Likeness | None]) -> Likeness:
     if not known:
         raise GridError(
             "the smoke is opaque in no frame that was looked at, so that its style cannot be "
-            "measured; choose others with --frames"
+            "measured; choose others with `frames`"
         )
-    return Likeness(
-        tuple(sight for part in known for sight in part.sights),
+    return StyleScore(
+        tuple(viewpoint for part in known for viewpoint in part.viewpoints),
         tuple(distances for part in known for distances in part.painted),
         mean_distances(part.plain for part in known),
         mean_distances(part.cutout for part in known),
     )
 
 
-def likeness(gauge: StyleGauge, pairs: Sequence[Pair]) -> Likeness | None:
+def style_score(metric: StyleMetric, pairs: Sequence[Pair]) -> StyleScore | None:
     """Compare views of a frame with the style picture where the smoke is opaque.
 
     None where it is opaque in none of them.
@@ -102,14 +102,14 @@ def likeness(gauge: StyleGauge, pairs: Sequence[Pair]) -> Likeness | None:
     pairs = [pair for pair in pairs if pair.where.sum() >= FEWEST_OPAQUE]
     if not pairs:
         return None
-    return Likeness(
-        tuple(pair.sight for pair in pairs),
-        tuple(gauge.distances(p.painted.over(gauge.background), p.where) for p in pairs),
-        mean_distances(gauge.distances(p.plain.over(gauge.background), p.where) for p in pairs),
+    return StyleScore(
+        tuple(pair.viewpoint for pair in pairs),
+        tuple(metric.distances(p.painted.over(metric.background), p.where) for p in pairs),
+        mean_distances(metric.distances(p.plain.over(metric.background), p.where) for p in pairs),
         mean_distances(
-            gauge.distances(*part)
+            metric.distances(*part)
             for seed, pair in enumerate(pairs)
-            for part in gauge.cutouts(pair.where, CUTOUTS, seed)
+            for part in metric.cutouts(pair.where, CUTOUTS, seed)
         ),
     )
 
@@ -125,7 +125,7 @@ def measure_style(
     every: int = 6,
     config: StylizeConfig | None = None,
     compute: Compute | None = None,
-) -> Likeness:
+) -> StyleScore:
     """Paint a sequence and compare four sides of some of its frames with the style picture.
 
     Args:
@@ -144,14 +144,14 @@ def measure_style(
     """
     frames = list(on_one_lattice(frames))
     box = reduce(Box.union, (smoke.box for smoke in frames), Box((0, 0, 0), (0, 0, 0)))
-    stage = Stage.around(frames, rule, size).refined(refine)
-    gauge = StyleGauge(picture, round(cells * stage.scale))
+    setup = Setup.around(frames, rule, size).refined(refine)
+    metric = StyleMetric(picture, round(cells * setup.scale))
     config = config or StylizeConfig()
     paintings = stylize(frames, rule, config, box=box, refine=refine, compute=compute)
     parts = []
     for at, painting in enumerate(paintings, 1):
         if (len(frames) - at) % every == 0:
             smoke = Coloured.painted(painting), Coloured.plain(painting.smoke)
-            pairs = [stage.look_twice(*smoke, sight) for sight in SIDES]
-            parts.append(likeness(gauge, pairs))
-    return joined_likeness(parts)
+            pairs = [setup.look_twice(*smoke, viewpoint) for viewpoint in SIDES]
+            parts.append(style_score(metric, pairs))
+    return joined_style_score(parts)

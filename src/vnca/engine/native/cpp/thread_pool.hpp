@@ -1,4 +1,4 @@
-// A crew of threads that share the tasks of one call and sleep in between.
+// A pool of threads that share the tasks of one call and sleep in between.
 #pragma once
 
 #include <sys/types.h>
@@ -16,16 +16,16 @@
 
 namespace vnca {
 
-class Crew {
+class ThreadPool {
 public:
-    // The crew of this process. It is never destroyed: its threads sleep until the process ends.
-    // After a fork the child, which inherits no threads, gets a crew of its own.
-    static Crew& of_process() {
+    // The pool of this process. It is never destroyed: its threads sleep until the process ends.
+    // After a fork the child, which inherits no threads, gets a pool of its own.
+    static ThreadPool& of_process() {
         static std::mutex guard;
-        static Crew* crew = nullptr;
+        static ThreadPool* pool = nullptr;
         const std::lock_guard lock(guard);
-        if (crew == nullptr || crew->process_ != getpid()) crew = new Crew;
-        return *crew;
+        if (pool == nullptr || pool->process_ != getpid()) pool = new ThreadPool;
+        return *pool;
     }
 
     // Runs task(index, worker) for every index in [0, tasks), `worker` < threads telling who does

@@ -28,7 +28,7 @@ _GREY = 0.214  # linear, of sRGB ½: what a state of zeros shows
 _LIGHT = np.array([-0.48, -0.36, 0.8], np.float32)  # towards it
 
 
-class Sight(NamedTuple):
+class Viewpoint(NamedTuple):
     """Where smoke is looked at from, degrees."""
 
     azimuth: float
@@ -93,7 +93,7 @@ class Seen:
 class Pair:
     """The same smoke seen from the same place, painted and as it comes."""
 
-    sight: Sight
+    viewpoint: Viewpoint
     painted: Seen
     plain: Seen
 
@@ -104,7 +104,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Stage:
+class Setup:
     """How a sequence is looked at.
 
     Attributes:
@@ -118,7 +118,7 @@ class Stage:
     size: int = SIZE
 
     @classmethod
-    def around(cls, frames: Iterable[Volume], rule: Rule, size: int = SIZE) -> "Stage":
+    def around(cls, frames: Iterable[Volume], rule: Rule, size: int = SIZE) -> "Setup":
         """Framed on what a rule takes for smoke, as bright as what it was trained on.
 
         Raises:
@@ -132,25 +132,25 @@ class Stage:
             raise GridError("there is no smoke in any frame; choose others")
         return cls(box, rule.scales.gamma / rule.scales.density, size)
 
-    def refined(self, factor: int) -> "Stage":
+    def refined(self, factor: int) -> "Setup":
         """The same place on a grid `factor` times as fine along each axis."""
         return replace(self, box=self.box.refined(factor), gamma=self.gamma / factor)
 
     @property
     def scale(self) -> float:
         """Pixels per cell, the same from all sides."""
-        return self.size / self.camera(Sight(0.0, 0.0)).height
+        return self.size / self.camera(Viewpoint(0.0, 0.0)).height
 
-    def camera(self, sight: Sight, origin: Index = (0, 0, 0)) -> Orthographic:
+    def camera(self, viewpoint: Viewpoint, origin: Index = (0, 0, 0)) -> Orthographic:
         """The camera that sees all of the box, in coordinates of arrays that begin at `origin`."""
         lower, upper = (
             (np.subtract(corner, origin) - 0.5).tolist()
             for corner in (self.box.lower, self.box.upper)
         )
-        return turntable(lower, upper, *sight)
+        return turntable(lower, upper, *viewpoint)
 
     @torch.no_grad()
-    def look(self, smoke: Coloured, sight: Sight) -> Seen:
+    def look(self, smoke: Coloured, viewpoint: Viewpoint) -> Seen:
         """A picture of smoke."""
         if 0 in smoke.density.shape:
             nothing = np.zeros((self.size, self.size), np.float32)
@@ -160,7 +160,7 @@ class Stage:
         view = render(
             torch.from_numpy(smoke.density),
             torch.from_numpy(smoke.colour),
-            self.camera(sight, smoke.origin),
+            self.camera(viewpoint, smoke.origin),
             rows=self.size,
             columns=self.size,
             gamma=self.gamma,
@@ -168,11 +168,11 @@ class Stage:
         )
         return Seen(view.colour.numpy(), view.opacity.numpy(), view.depth.numpy())
 
-    def look_twice(self, painted: Coloured, plain: Coloured, sight: Sight) -> Pair:
+    def look_twice(self, painted: Coloured, plain: Coloured, viewpoint: Viewpoint) -> Pair:
         """Both from the same place."""
-        return Pair(sight, self.look(painted, sight), self.look(plain, sight))
+        return Pair(viewpoint, self.look(painted, viewpoint), self.look(plain, viewpoint))
 
-    def motion(self, smoke: Volume, sight: Sight) -> FloatArray | None:
+    def motion(self, smoke: Volume, viewpoint: Viewpoint) -> FloatArray | None:
         """How smoke is seen to move, pixels per frame to the right and down, `[r, c, 2]`.
 
         None where the smoke has no velocity.
@@ -182,7 +182,7 @@ class Stage:
         moved, _ = projected_velocity(
             torch.from_numpy(smoke.density),
             torch.from_numpy(smoke.velocity),
-            self.camera(sight, smoke.origin),
+            self.camera(viewpoint, smoke.origin),
             rows=self.size,
             columns=self.size,
             gamma=self.gamma,

@@ -6,9 +6,9 @@ import pytest
 from vnca.core.errors import GridError
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
-from vnca.metrics.likeness import SIDES, likeness, measure_style
-from vnca.metrics.stage import Coloured, Stage
-from vnca.metrics.style import StyleGauge
+from vnca.metrics.setup import Coloured, Setup
+from vnca.metrics.style import StyleMetric
+from vnca.metrics.style_score import SIDES, measure_style, style_score
 from vnca.rule.rule import Rule, RuleConfig, Scales
 
 
@@ -27,22 +27,24 @@ def picture() -> FloatArray:
 
 
 def test_smoke_as_it_comes_closes_nothing(tiny_smoke: Volume, picture: FloatArray) -> None:
-    stage, gauge = Stage.around([tiny_smoke], rule(), 64), StyleGauge(picture, 64)
+    setup, metric = Setup.around([tiny_smoke], rule(), 64), StyleMetric(picture, 64)
     plain = Coloured.plain(tiny_smoke)
-    pairs = [stage.look_twice(plain, plain, sight) for sight in SIDES]
-    found = likeness(gauge, pairs)
+    pairs = [setup.look_twice(plain, plain, viewpoint) for viewpoint in SIDES]
+    found = style_score(metric, pairs)
     assert found is not None
     assert found.gap_closed == pytest.approx(0, abs=0.02)
     assert found.by_measure["palette"] == pytest.approx(0, abs=0.1)
 
 
 def test_paint_of_the_right_colours_closes_more(tiny_smoke: Volume, picture: FloatArray) -> None:
-    stage, gauge = Stage.around([tiny_smoke], rule(), 64), StyleGauge(picture, 64)
+    setup, metric = Setup.around([tiny_smoke], rule(), 64), StyleMetric(picture, 64)
     plain = Coloured.plain(tiny_smoke)
     random = np.random.default_rng(1)
     colour = picture.reshape(-1, 3)[random.integers(0, 64 * 80, tiny_smoke.density.shape)]
     painted = plain._replace(colour=colour)
-    found = likeness(gauge, [stage.look_twice(painted, plain, sight) for sight in SIDES])
+    found = style_score(
+        metric, [setup.look_twice(painted, plain, viewpoint) for viewpoint in SIDES]
+    )
     assert found is not None
     assert found.gap_closed > 0.3
     assert found.by_measure["palette"] > 0.3
@@ -54,7 +56,7 @@ def test_a_sequence_is_looked_at_every_few_frames_and_at_its_end(
 ) -> None:
     frames = [dataclasses.replace(tiny_smoke, frame=number) for number in range(4)]
     found = measure_style(rule(), frames, picture, cells=24, size=96, every=2)
-    assert found.sights == SIDES * 2
+    assert found.viewpoints == SIDES * 2
     again = measure_style(rule(), frames, picture, cells=24, size=96, every=2)
     assert found.shares == again.shares
 
@@ -62,16 +64,16 @@ def test_a_sequence_is_looked_at_every_few_frames_and_at_its_end(
 def test_a_finer_painting_is_compared_with_a_picture_half_as_large(
     tiny_smoke: Volume, picture: FloatArray
 ) -> None:
-    stage = Stage.around([tiny_smoke], rule(), 64)
-    fine = stage.refined(2)
-    assert fine.scale == pytest.approx(stage.scale / 2)
-    sight = SIDES[1]
+    setup = Setup.around([tiny_smoke], rule(), 64)
+    fine = setup.refined(2)
+    assert fine.scale == pytest.approx(setup.scale / 2)
+    viewpoint = SIDES[1]
     plain = Coloured.plain(tiny_smoke)._replace(
         colour=np.ones((*tiny_smoke.density.shape, 3), np.float32)
     )
     finer = tiny_smoke.refined(2)
     also = Coloured(finer.density, np.ones((*finer.density.shape, 3), np.float32), finer.origin)
-    pair = stage.look(plain, sight), fine.look(also, sight)
+    pair = setup.look(plain, viewpoint), fine.look(also, viewpoint)
     assert np.abs(pair[0].opacity - pair[1].opacity).mean() < 0.02
     few = {"cells": 48, "size": 96}
     found = measure_style(rule(), [tiny_smoke], picture, **few, refine=2)
@@ -87,7 +89,7 @@ def test_smoke_that_cannot_be_seen_is_refused(tiny_smoke: Volume, picture: Float
 
 
 def test_plain_smoke_is_grey_and_its_shape_can_be_seen(tiny_smoke: Volume) -> None:
-    stage = Stage.around([tiny_smoke], rule(), 64)
-    seen = stage.look(Coloured.plain(tiny_smoke), SIDES[0]).over([0, 0, 0])
+    setup = Setup.around([tiny_smoke], rule(), 64)
+    seen = setup.look(Coloured.plain(tiny_smoke), SIDES[0]).over([0, 0, 0])
     np.testing.assert_allclose(seen.max(-1), seen.min(-1), atol=1e-6)
     assert seen[20:24, 32].mean() > 1.2 * seen[40:44, 32].mean()
