@@ -171,9 +171,11 @@ def _options(
 ) -> Iterator[Option]:
     hints, texts = get_type_hints(kind, include_extras=True), _texts(kind)
     for field in dataclasses.fields(kind):
-        hint, marks = hints[field.name], ()
+        hint: Any = hints[field.name]
+        marks: tuple[Any, ...] = ()
         if get_origin(hint) is Annotated:
-            hint, *marks = get_args(hint)
+            hint, *rest = get_args(hint)
+            marks = tuple(rest)
         value = _value(field, default)
         name = prefix + field.name.replace("_", "-")
         if dataclasses.is_dataclass(hint) and isinstance(hint, type):
@@ -221,7 +223,8 @@ def _form(hint: Any, separator: str) -> str:
     if origin is tuple:
         one = _form(inside[0], separator)
         return f"{one}{separator}…" if separator.strip() else f"{one} …"
-    return {bool: "{True,False}", Path: "PATH", str: "TEXT"}.get(hint, hint.__name__.upper())
+    names: dict[Any, str] = {bool: "{True,False}", Path: "PATH", str: "TEXT"}
+    return names.get(hint) or hint.__name__.upper()
 
 
 def _written(value: Any, separator: str) -> str:

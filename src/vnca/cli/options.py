@@ -54,8 +54,9 @@ def parse(
         )
         print(shown)
         raise SystemExit(0)
+    complaint = io.StringIO()
     try:
-        with redirect_stderr(io.StringIO()) as complaint:
+        with redirect_stderr(complaint):
             return tyro.cli(options, prog=f"vnca {command}", args=list(arguments), **keywords)
     except SystemExit:
         what = _in_one_line(complaint.getvalue())
