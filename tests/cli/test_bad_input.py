@@ -392,7 +392,8 @@ def test_unknown_commands_and_options(vnca: Vnca, arguments: list[str]) -> None:
     outcome = vnca(*arguments)
     assert outcome.code == 2
     assert "Traceback" not in outcome.err
-    assert arguments[-1].lstrip("-") in outcome.err or "required" in outcome.err.lower()
+    assert arguments[-1].lstrip("-") in outcome.err or "Missing" in outcome.err
+    assert len(outcome.err.splitlines()) == 1
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from vnca.cli.train import Train, train, training_inputs
 from vnca.core.errors import OptionError
 from vnca.core.files import existing_file, whole_file, writable_file
 from vnca.core.volume import Volume
-from vnca.features.vgg import VGG16
+from vnca.features.load import load_network
 from vnca.io.picture import read_image
 from vnca.io.smoke import SmokeFormat
 from vnca.metrics.estimators import Estimator, estimators
@@ -160,11 +160,11 @@ def _runs(options: Ablate, smoke: Volume) -> list[_Run]:
         VncaError: If the picture cannot be read, or a folder holds a run of something else.
     """
     style = read_image(options.style)
-    vgg = VGG16.load(options.config.features, choose_device(options.device))
+    network = load_network(options.config.features, choose_device(options.device))
     runs = []
     for variant, config in _configurations(options):
         folder = options.out / f"{variant.replace(' ', '_')}-{config.seed}"
-        wanted = training_inputs(smoke, style, config, vgg)
+        wanted = training_inputs(smoke, style, config, network)
         runs.append(_Run(variant, config, folder, _is_trained(folder, wanted, config.iterations)))
     return runs
 

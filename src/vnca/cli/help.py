@@ -198,7 +198,7 @@ def _options(
         )
 
 
-_POSITIONAL = get_args(tyro.conf.Positional[int])[1]
+_POSITIONAL: Any = list(get_args(tyro.conf.Positional[int]))[1]
 
 
 def _value(field: "dataclasses.Field[Any]", default: Any) -> Any:
@@ -211,7 +211,8 @@ def _value(field: "dataclasses.Field[Any]", default: Any) -> Any:
 
 def _form(hint: Any, separator: str) -> str:
     """How a value of a type is written on the command line."""
-    origin, inside = get_origin(hint), get_args(hint)
+    origin: Any = get_origin(hint)
+    inside: list[Any] = list(get_args(hint))
     if origin is Annotated:
         return _form(inside[0], separator)
     if origin is Literal:

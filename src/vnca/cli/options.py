@@ -90,7 +90,7 @@ def spelled_out(arguments: Sequence[str]) -> list[str]:
 def chosen(arguments: Sequence[str], option: str, default: str) -> str:
     """The value of an option that has to be known before the others can be read."""
     value = default
-    for word, following in zip(arguments, [*arguments[1:], default], strict=True):
+    for word, following in zip(arguments, [*arguments, default][1:], strict=True):
         if word == option:
             value = following
         elif word.startswith(f"{option}="):

@@ -18,8 +18,34 @@ _REDRAW_SECONDS = 0.2
 _LOG_SECONDS = 15.0
 
 _line_is_open = False
-_events: TextIO | None = None
-"""Where events go, an object a line, while they are wanted."""
+
+
+class _Notes(io.TextIOBase):
+    """A stream each of whose lines becomes an event of another."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream, self._line = stream, ""
+
+    def write(self, text: str, /) -> int:
+        *lines, self._line = (self._line + text).split("\n")
+        for line in filter(None, (line.strip() for line in lines)):
+            self.tell(event="note", text=line)
+        return len(text)
+
+    def tell(self, **facts: Any) -> None:
+        """Write an event."""
+        print(json.dumps(facts), file=self.stream, flush=True)
+
+    def end(self) -> None:
+        """Tell of a last line that was not ended."""
+        self.write("\n")
+
+    def fileno(self) -> int:
+        return self.stream.fileno()
+
+
+_notes: _Notes | None = None
+"""Where events go while they are wanted."""
 
 
 @contextmanager
@@ -28,46 +54,26 @@ def json_events(*, wanted: bool) -> Iterator[None]:
 
     Whatever else is written there becomes notes; docs/guide/automation.md lists the objects.
     """
-    global _events
+    global _notes
     if not wanted:
         yield
         return
-    before, _events = _events, sys.stderr
+    before, _notes = _notes, _Notes(sys.stderr)
     try:
-        with redirect_stderr(_Notes(sys.stderr)) as notes:
+        with redirect_stderr(_notes):
             yield
-            notes.end()
+            _notes.end()
     finally:
-        _events = before
+        _notes = before
 
 
 def event(kind: str, **facts: Any) -> bool:
     """Tell programs that something happened; False if they do not listen."""
-    if _events is None:
+    if _notes is None:
         return False
-    print(json.dumps({"event": kind, **facts}), file=_events, flush=True)
+    _notes.end()
+    _notes.tell(event=kind, **facts)
     return True
-
-
-class _Notes(io.TextIOBase):
-    """A stream each of whose lines becomes an event."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream, self._line = stream, ""
-
-    def write(self, text: str, /) -> int:
-        *lines, self._line = (self._line + text).split("\n")
-        for line in filter(None, (line.strip() for line in lines)):
-            event("note", text=line)
-        return len(text)
-
-    def end(self) -> None:
-        """Tell of a last line that was not ended."""
-        if self._line:
-            self.write("\n")
-
-    def fileno(self) -> int:
-        return self._stream.fileno()
 
 
 def made(what: str, path: Path) -> None:
@@ -122,7 +128,7 @@ class Progress:
         """Say that `done` units are finished; `note` is added at the end of the line."""
         global _line_is_open
         now = time.monotonic()
-        is_often = self._terminal or _events is not None
+        is_often = self._terminal or _notes is not None
         pause = _REDRAW_SECONDS if is_often else _LOG_SECONDS
         if now - self._drawn < pause and done < self._total:
             return
