@@ -177,10 +177,10 @@ def _options(
             hint, *rest = get_args(hint)
             marks = tuple(rest)
         value = _value(field, default)
-        name = prefix + field.name.replace("_", "-")
+        named = next((n for n in (getattr(m, "name", None) for m in marks) if n is not None), None)
+        name = prefix + (field.name.replace("_", "-") if named is None else named)
         if dataclasses.is_dataclass(hint) and isinstance(hint, type):
-            is_flat = any(getattr(mark, "name", None) == "" for mark in marks)
-            inside = prefix if is_flat else f"{name}."
+            inside = f"{name}." if named != "" else prefix
             title = (inspect.getdoc(hint) or "").partition("\n\n")[0]
             yield from _options(hint, value, inside, title, separator)
             continue

@@ -29,10 +29,10 @@ class _Notes(io.TextIOBase):
     def write(self, text: str, /) -> int:
         *lines, self._line = (self._line + text).split("\n")
         for line in filter(None, (line.strip() for line in lines)):
-            self.tell(event="note", text=line)
+            self.add(event="note", text=line)
         return len(text)
 
-    def tell(self, **facts: Any) -> None:
+    def add(self, **facts: Any) -> None:
         """Write an event."""
         print(json.dumps(facts), file=self.stream, flush=True)
 
@@ -72,7 +72,7 @@ def event(kind: str, **facts: Any) -> bool:
     if _notes is None:
         return False
     _notes.end()
-    _notes.tell(event=kind, **facts)
+    _notes.add(event=kind, **facts)
     return True
 
 
