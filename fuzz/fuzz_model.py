@@ -9,6 +9,7 @@ import struct
 import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import atheris
@@ -16,6 +17,7 @@ import numpy as np
 from harness import fuzz, lengthened, shortened
 
 with atheris.instrument_imports(include=["vnca", "json"]):
+    from vnca.automaton.decoder import Decoder
     from vnca.automaton.model import Model, from_record
     from vnca.automaton.rule import Rule, RuleConfig, Scales
     from vnca.io.smoke_format import SmokeFormat
@@ -60,8 +62,13 @@ def seeds() -> Iterator[bytes]:
     training = {"style": "a.png", "smoke": {"fps": 24.0, "up_axis": "z"}, "iterations": 3}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.safetensors"
-        for style in (None, np.full((1, 2, 3), 7, np.uint8)):
-            Model(rule, training, style).save(path)
+        style, decoder = np.full((1, 2, 3), 7, np.uint8), Decoder.initial(4, units=1, seed=0)
+        for model in (
+            Model(rule, training),
+            Model(rule, training, style),
+            Model(replace(rule, decoder=decoder), training, style),
+        ):
+            model.save(path)
             content = path.read_bytes()
             (length,) = struct.unpack_from("<Q", content)
             header, tensors = content[8 : 8 + length], content[8 + length :]
@@ -73,5 +80,5 @@ def seeds() -> Iterator[bytes]:
 if __name__ == "__main__":
     fuzz(
         "model", suffix=".safetensors", build=build, read=read, limit=limit, seeds=seeds(),
-        longest=2048, between=_BETWEEN,
+        longest=4096, between=_BETWEEN,
     )  # fmt: skip

@@ -8,6 +8,7 @@ input brings its own; and the file claims to have offsets, or not, as the input 
 import struct
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -20,7 +21,7 @@ with atheris.instrument_imports(include=["vnca"]):
     from vnca.io import vdb_smoke
     from vnca.io.smoke import SmokeFormat, read_smoke
     from vnca.io.vdb import VALUE_TYPES, Grid, Tiles, Transform, open_vdb, write_vdb
-    from vnca.io.vdb.cursor import Cursor
+    from vnca.io.vdb.cursor import Cursor, encode_string
     from vnca.io.vdb.metadata import Metadata, read_metadata
     from vnca.typing import Box
 
@@ -71,6 +72,8 @@ def read(path: Path) -> None:
         return
     with open_vdb(path) as file:
         for header in file.grids.values():
+            if not header.is_readable:
+                continue
             grid = header.read()
             grid.active_box()
             assert header.box is None or header.box.shape
@@ -115,6 +118,18 @@ def seeds() -> Iterator[bytes]:
             yield without_offsets(taken_apart(bytes(content)))
             content[_CLAIMS_OFFSETS] = False
             yield taken_apart(bytes(content))
+            if name == "int32":
+                other = replace(grid, name="other")
+                write_vdb(path, [grid, other], compression="none")
+                yield with_frustum(taken_apart(path.read_bytes()), other.transform)
+
+
+def with_frustum(data: bytes, transform: Transform) -> bytes:
+    """The same input with the last grid in a frustum, whose linear map is `transform`."""
+    *parts, head, values = data.split(_BETWEEN)
+    linear = transform.encode()
+    frustum = encode_string(b"NonlinearFrustumMap") + struct.pack("<8d", *range(8)) + linear
+    return _BETWEEN.join((*parts, shortened(lengthened(head).replace(linear, frustum)), values))
 
 
 def without_offsets(data: bytes) -> bytes:

@@ -19,7 +19,7 @@ CAMERAS = [
 @pytest.mark.parametrize("size", [(6, 9), (7, 4)])
 def test_projection_puts_a_point_on_a_ray_back_on_its_pixel(camera, size) -> None:
     origins, directions = camera.rays(*size)
-    assert origins.dtype == directions.dtype == np.float32
+    assert origins.dtype == directions.dtype == np.float64
     np.testing.assert_allclose(np.linalg.norm(directions, axis=-1), 1, rtol=1e-6)
     for depth in (2.0, 25.0):
         row, column, found = camera.project(origins + depth * directions, *size)

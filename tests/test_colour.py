@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vnca.colour import linear_to_srgb, luminance, srgb_to_linear
+from vnca.colour import linear_to_srgb, luminance, rec709_from, srgb_to_linear
 
 
 def test_known_codes_decode_to_the_standard_values() -> None:
@@ -33,3 +33,22 @@ def test_single_precision_stays_single() -> None:
 def test_white_has_luminance_one_and_green_is_brightest() -> None:
     assert luminance([1.0, 1.0, 1.0]) == pytest.approx(1)
     assert luminance(np.eye(3)).argmax() == 1
+
+
+def test_the_primaries_of_rec709_change_nothing() -> None:
+    ours = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+    np.testing.assert_allclose(rec709_from(ours), np.eye(3), atol=1e-12)
+
+
+def test_acescg_is_converted_as_the_field_does() -> None:
+    """By the matrix that is commonly published, with Bradford adaptation, to four digits."""
+    acescg = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
+    expected = [[1.7051, -0.6218, -0.0833], [-0.1303, 1.1408, -0.0105], [-0.0240, -0.1290, 1.1530]]
+    np.testing.assert_allclose(rec709_from(acescg), expected, atol=1e-4)
+    np.testing.assert_allclose(rec709_from(acescg).sum(1), 1, atol=1e-9)
+
+
+@pytest.mark.parametrize("primaries", [(0.0,) * 8, (0.3, 0.3) * 4, (np.nan,) * 8])
+def test_primaries_of_which_no_colours_can_be_made_are_refused(primaries: tuple) -> None:
+    with pytest.raises(ValueError, match="no colours"):
+        rec709_from(primaries)

@@ -75,3 +75,8 @@ def test_a_frame_without_smoke_has_none_on_a_finer_grid() -> None:
     fine = nothing.refined(3)
     assert fine.box.is_empty
     assert fine.velocity is not None
+
+
+def test_the_length_of_a_cell_is_that_of_a_cube_as_large() -> None:
+    assert ramp().cell_length == pytest.approx(np.cbrt(0.5 * 0.25 * 2))
+    assert ramp().refined(2).cell_length == pytest.approx(ramp().cell_length / 2)

@@ -10,7 +10,7 @@ from study import Study
 from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
 from vnca.camera import frame_box
-from vnca.features.vgg import VGG16
+from vnca.features.load import load_network
 from vnca.io.image import fit, read_image
 from vnca.io.sheet import contact_sheet
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
@@ -57,9 +57,9 @@ class Judge:
         self.view, self._place = study.config.view, study.place
         self.style = read_image(study.style)
         self._loss = AppearanceLoss(
-            VGG16.load(study.features, study.place),
+            load_network(study.features, study.place),
             self.style,
-            AppearanceConfig(pixels=1.0),
+            AppearanceConfig(pixels=1.0, style_scale=1.0),
             self.view.size,
         )
 

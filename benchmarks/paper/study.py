@@ -23,6 +23,7 @@ from vnca.errors import OptionError, VncaError
 from vnca.files import existing_file, writable_folder
 from vnca.io.image import write_image
 from vnca.io.smoke import SmokeFormat, read_smoke
+from vnca.losses.appearance import AppearanceConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME
 from vnca.training.config import PRESETS, TrainConfig, ViewConfig
 from vnca.training.course import PoolConfig
@@ -33,7 +34,10 @@ ROOT = Path(__file__).parents[2]
 REFERENCE = "reference"
 """The rule that nothing was taken from; all studies share it."""
 DRAFT = TrainConfig(
-    rule=RuleConfig(position_prior=False), view=ViewConfig(size=96), pool=PoolConfig(size=16)
+    rule=RuleConfig(position_prior=False),
+    view=ViewConfig(size=96),
+    pool=PoolConfig(size=16),
+    appearance=AppearanceConfig(style_scale=1.0),
 )
 """A training from nothing, small enough for many on two cores."""
 
@@ -57,7 +61,7 @@ class Study:
     seeds: tuple[int, ...] = (0, 1)
     """A rule of each kind for each seed."""
     features: str = "edges"
-    """Weights of VGG16, for training and judging: edges, imagenet or a path."""
+    """Network for training and judging, as `vnca train --features` has it."""
     device: str | None = None
     """Where to train and judge: cpu, cuda or auto; cuda if --full, else cpu."""
     csv: Path | None = None

@@ -27,7 +27,8 @@ from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
 from vnca.bench.machine import run_facts
 from vnca.bench.records import append_csv, write_json
-from vnca.features.vgg import VGG16
+from vnca.features.load import load_network
+from vnca.features.network import FeatureNetwork
 from vnca.io.image import read_image
 from vnca.losses.appearance import AppearanceLoss
 from vnca.texturing.block import border_jump, grow
@@ -56,14 +57,14 @@ class Task:
         """Rows and columns of a slice."""
         return PRESETS[self.preset].slices.size
 
-    def judge(self, style: FloatArray, vgg: VGG16) -> AppearanceLoss:
+    def judge(self, style: FloatArray, network: FeatureNetwork) -> AppearanceLoss:
         """What the rule was trained with, for both methods."""
-        return AppearanceLoss(vgg, style, PRESETS[self.preset].appearance, self.slice_size)
+        return AppearanceLoss(network, style, PRESETS[self.preset].appearance, self.slice_size)
 
-    def begin(self) -> tuple[FloatArray, VGG16]:
+    def begin(self) -> tuple[FloatArray, FeatureNetwork]:
         """The picture and the network, in the process that measures."""
         torch.set_num_threads(self.threads)
-        return read_image(self.style), VGG16.load(self.features)
+        return read_image(self.style), load_network(self.features)
 
     def done(self, started: float, iterations: int) -> bool:
         """Whether learning has had its time."""
@@ -74,10 +75,10 @@ class Task:
 
 def train(task: Task) -> tuple[Rule, dict[str, Any]]:
     """A rule trained for the time given; its learning rate falls as over that time."""
-    style, vgg = task.begin()
+    style, network = task.begin()
     config = replace(PRESETS[task.preset], features=task.features, seed=task.seed)
     if task.iterations is None:
-        trial = texture_trainer(style, config, vgg)
+        trial = texture_trainer(style, config, network)
         trial.improve()
         began = time.process_time()
         for _ in range(8):
@@ -86,7 +87,7 @@ def train(task: Task) -> tuple[Rule, dict[str, Any]]:
         config = replace(config, iterations=max(1, round(task.seconds / pace)))
     else:
         config = replace(config, iterations=task.iterations)
-    trainer = texture_trainer(style, config, vgg)
+    trainer = texture_trainer(style, config, network)
     began = time.process_time()
     for _ in trainer.run():
         pass
@@ -96,18 +97,18 @@ def train(task: Task) -> tuple[Rule, dict[str, Any]]:
 
 def grown(task: Task, rule: Rule, size: int) -> dict[str, Any]:
     """A block of a trained rule, and how near its slices come."""
-    style, vgg = task.begin()
+    style, network = task.begin()
     step = stepper(rule, threads=task.threads)
     began = time.process_time()
     block = next(grow(rule, step, size, steps=task.steps, seed=task.seed))
     made = time.process_time() - began
-    return {"make_s": round(made, 1), "peak_mb": peak_mb(), **judged(task, block, style, vgg)}
+    return {"make_s": round(made, 1), "peak_mb": peak_mb(), **judged(task, block, style, network)}
 
 
 def optimised(task: Task, size: int) -> dict[str, Any]:
     """A block of the baseline, and how near its slices come."""
-    style, vgg = task.begin()
-    appearance = task.judge(style, vgg)
+    style, network = task.begin()
+    appearance = task.judge(style, network)
     blocks = optimised_blocks(style, appearance, size, slice_size=task.slice_size, seed=task.seed)
     began = time.process_time()
     for iterations, block in zip(count(1), blocks, strict=False):  # noqa: B007
@@ -119,13 +120,15 @@ def optimised(task: Task, size: int) -> dict[str, Any]:
         "learn_s": 0.0,
         "make_s": round(made, 1),
         "peak_mb": peak_mb(),
-        **judged(task, block, style, vgg),
+        **judged(task, block, style, network),
     }
 
 
-def judged(task: Task, block: FloatArray, style: FloatArray, vgg: VGG16) -> dict[str, Any]:
+def judged(
+    task: Task, block: FloatArray, style: FloatArray, network: FeatureNetwork
+) -> dict[str, Any]:
     found = slice_distances(
-        block, task.judge(style, vgg), size=task.slice_size, count=task.slices, seed=1
+        block, task.judge(style, network), size=task.slice_size, count=task.slices, seed=1
     )
     totals = {name: distance.total for name, distance in found.items()}
     seen = (totals["axis"] + totals["oblique"]) / 2

@@ -15,12 +15,13 @@ if TYPE_CHECKING:
     from vnca.automaton.stepper import stepper
     from vnca.camera import Orthographic, Perspective, frame_box
     from vnca.errors import VncaError
-    from vnca.features.vgg import VGG16
+    from vnca.features.load import load_network
     from vnca.io.image import read_image, write_image
     from vnca.io.sequence import find_frames
     from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
     from vnca.io.vdb import open_vdb, write_vdb
     from vnca.io.video import FilmWriter
+    from vnca.lattice import Lattice
     from vnca.render.view import View
     from vnca.render.view import render as render_view
     from vnca.simulate.scenes import simulate as simulate_smoke
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Box": "typing",
     "FilmWriter": "io.video",
+    "Lattice": "lattice",
     "Model": "automaton.model",
     "Orthographic": "camera",
     "PRESETS": "training.config",
@@ -50,12 +52,12 @@ _HOMES = {
     "StylizeConfig": "stylize.config",
     "TrainConfig": "training.config",
     "Trainer": "training.loop",
-    "VGG16": "features.vgg",
     "View": "render.view",
     "VncaError": "errors",
     "Volume": "volume",
     "find_frames": "io.sequence",
     "frame_box": "camera",
+    "load_network": "features.load",
     "open_vdb": "io.vdb",
     "read_image": "io.image",
     "read_smoke": "io.smoke",
@@ -73,9 +75,9 @@ _HOMES = {
 
 __all__ = [
     "PRESETS",
-    "VGG16",
     "Box",
     "FilmWriter",
+    "Lattice",
     "Model",
     "Orthographic",
     "Painting",
@@ -92,6 +94,7 @@ __all__ = [
     "Volume",
     "find_frames",
     "frame_box",
+    "load_network",
     "open_vdb",
     "read_image",
     "read_smoke",

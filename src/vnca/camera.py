@@ -1,6 +1,8 @@
-"""Cameras that look at the grid, in cell coordinates.
+"""Cameras that look at a space in which +z is up.
 
-The centre of cell `[i, j, k]` is the point (i, j, k); +z is up. A camera looks at a target
+That space is the upright world (`Volume.index_to_upright`), or that of the cells where these are
+cubes and stand upright: then the centre of cell `[i, j, k]` is the point (i, j, k) and lengths are
+in cells. A camera looks at a target
 from an azimuth and an elevation, both in degrees. Azimuth 0 looks along +y with +x to the
 right; a growing azimuth walks the camera counter-clockwise as seen from above, so 90 looks
 along −x from the +x side. A positive elevation looks down from above; at 90 the top of the
@@ -16,7 +18,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 
 from vnca.errors import OptionError
-from vnca.typing import AnyArray, FloatArray
+from vnca.typing import AnyArray
 
 Point = tuple[float, float, float]
 
@@ -28,18 +30,18 @@ class Camera(Protocol):
     near: ClassVar[float]
     """Depth before which nothing is seen."""
 
-    def rays(self, rows: int, columns: int) -> tuple[FloatArray, FloatArray]:
+    def rays(self, rows: int, columns: int) -> tuple[AnyArray, AnyArray]:
         """One ray through each pixel centre: `point = origin + depth * direction`.
 
         Returns:
-            Origins and unit directions, both `[rows, columns, 3]`, in cells.
+            Origins and unit directions, both `[rows, columns, 3]`, float64: a world may be large.
         """
         ...
 
     def project(
         self, points: AnyArray, rows: int, columns: int
     ) -> tuple[AnyArray, AnyArray, AnyArray]:
-        """Where points in cell coordinates `[..., 3]` appear: the inverse of `rays`.
+        """Where points `[..., 3]` appear: the inverse of `rays`.
 
         Returns:
             Row, column (whole numbers at pixel centres) and depth along the ray, each `[...]`.
@@ -55,7 +57,7 @@ class _LookAt:
     elevation: float = 0.0
 
     def view_coordinates(self, points: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray]:
-        """Right, up and forward of the target, in cells, for points `[..., 3]`."""
+        """Right, up and forward of the target, for points `[..., 3]`."""
         offset = np.asarray(points, np.float64) - np.asarray(self.target)
         right, up, forward = view_axes(self.azimuth, self.elevation)
         return offset @ right, offset @ up, offset @ forward
@@ -69,10 +71,10 @@ class Orthographic(_LookAt):
     nothing is cut off.
 
     Attributes:
-        target: Cell coordinates of the point in the middle of the picture.
+        target: The point in the middle of the picture.
         azimuth: Degrees, as described at the top of this module.
         elevation: Degrees.
-        height: Cells between the top and the bottom edge of the picture.
+        height: Length between the top and the bottom edge of the picture.
     """
 
     height: float = 1.0
@@ -80,15 +82,14 @@ class Orthographic(_LookAt):
 
     def __post_init__(self) -> None:
         if not self.height > 0:
-            raise OptionError(f"camera height: expected more than 0 cells, got {self.height}")
+            raise OptionError(f"camera height: expected more than 0, got {self.height}")
 
-    def rays(self, rows: int, columns: int) -> tuple[FloatArray, FloatArray]:
+    def rays(self, rows: int, columns: int) -> tuple[AnyArray, AnyArray]:
         """See `Camera.rays`."""
         right, up, forward = view_axes(self.azimuth, self.elevation)
         x, y = (self.height * offset for offset in _pixel_offsets(rows, columns))
         origins = np.asarray(self.target) + x[..., None] * right + y[..., None] * up
-        directions = np.broadcast_to(forward, origins.shape)
-        return origins.astype(np.float32), directions.astype(np.float32)
+        return origins, np.broadcast_to(forward, origins.shape)
 
     def project(
         self, points: AnyArray, rows: int, columns: int
@@ -106,10 +107,10 @@ class Perspective(_LookAt):
     Depth is the distance from the pinhole.
 
     Attributes:
-        target: Cell coordinates of the point in the middle of the picture.
+        target: The point in the middle of the picture.
         azimuth: Degrees, as described at the top of this module.
         elevation: Degrees.
-        distance: Cells from the pinhole to the target.
+        distance: Length from the pinhole to the target.
         field_of_view: Degrees between the top and the bottom edge of the picture.
     """
 
@@ -119,10 +120,10 @@ class Perspective(_LookAt):
 
     def __post_init__(self) -> None:
         if not self.distance > 0:
-            raise OptionError(f"camera distance: expected more than 0 cells, got {self.distance}")
+            raise OptionError(f"camera distance: expected more than 0, got {self.distance}")
         _check_field_of_view(self.field_of_view)
 
-    def rays(self, rows: int, columns: int) -> tuple[FloatArray, FloatArray]:
+    def rays(self, rows: int, columns: int) -> tuple[AnyArray, AnyArray]:
         """See `Camera.rays`."""
         right, up, forward = view_axes(self.azimuth, self.elevation)
         extent = 2 * _slope(self.field_of_view)
@@ -130,8 +131,7 @@ class Perspective(_LookAt):
         directions = forward + x[..., None] * right + y[..., None] * up
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         pinhole = np.asarray(self.target) - self.distance * forward
-        origins = np.broadcast_to(pinhole, directions.shape)
-        return origins.astype(np.float32), directions.astype(np.float32)
+        return np.broadcast_to(pinhole, directions.shape), directions
 
     def project(
         self, points: AnyArray, rows: int, columns: int
@@ -158,7 +158,7 @@ def frame_box(
     """The camera that sees a box as large as the picture allows, all corners inside.
 
     Args:
-        lower: Least corner of the box, cell coordinates.
+        lower: Least corner of the box.
         upper: Greatest corner.
         azimuth: Degrees, as described at the top of this module.
         elevation: Degrees.
@@ -208,7 +208,7 @@ def turntable(
     side asks for.
 
     Args:
-        lower: Least corner of the box, cell coordinates.
+        lower: Least corner of the box.
         upper: Greatest corner.
         azimuth: Degrees, as described at the top of this module.
         elevation: Degrees.
@@ -226,6 +226,21 @@ def turntable(
     tallest = height * math.cos(tilt) + across * math.sin(tilt)
     needed = max(across, tallest) / (1 - 2 * margin)
     return Orthographic(_point((low + high) / 2), azimuth, elevation, height=float(needed))
+
+
+def world_box(
+    lower: Sequence[float] | AnyArray, upper: Sequence[float] | AnyArray, cells_to_world: AnyArray
+) -> tuple[AnyArray, AnyArray]:
+    """The least and greatest corner of the world's box around a box of cells.
+
+    Args:
+        lower: Least corner of the box of cells, in cell coordinates.
+        upper: Greatest corner.
+        cells_to_world: 4×4, affine.
+    """
+    corners = np.array(list(product(*zip(lower, upper, strict=True))), np.float64)
+    corners = corners @ cells_to_world[:3, :3].T + cells_to_world[:3, 3]
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def view_axes(azimuth: float, elevation: float) -> tuple[AnyArray, AnyArray, AnyArray]:

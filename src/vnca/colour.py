@@ -1,5 +1,6 @@
 """From the numbers in picture files to light, and back."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 # Rec. 709 primaries, which sRGB shares.
 LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
+_REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+# From CIE XYZ to the responses of cones, about.
+_BRADFORD = np.array(
+    [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
+)
 
 
 def srgb_to_linear(value: ArrayLike) -> NDArray[Any]:
@@ -42,6 +48,39 @@ def luminance(rgb: ArrayLike) -> NDArray[Any]:
     """Rec. 709 relative luminance of linear RGB `[..., 3]`, as `[...]`."""
     rgb = _floating(rgb)
     return rgb @ np.asarray(LUMINANCE_WEIGHTS, rgb.dtype)
+
+
+def rec709_from(chromaticities: Sequence[float]) -> NDArray[np.float64]:
+    """The 3×3 matrix from linear RGB of other primaries to that of Rec. 709.
+
+    White becomes white, as an eye that has adapted to it sees it.
+
+    Args:
+        chromaticities: CIE x, y of red, green, blue and white.
+
+    Raises:
+        ValueError: If no colours can be made of such primaries.
+
+    Reference: SMPTE RP 177; Lam 1985 (Bradford).
+    """
+    with np.errstate(all="ignore"):  # refused below
+        ours, theirs = (_to_xyz(np.asarray(each, np.float64)) for each in (_REC709, chromaticities))
+        white, source = (matrix.sum(1) @ _BRADFORD.T for matrix in (ours, theirs))
+        adapted = np.linalg.inv(_BRADFORD) @ np.diag(white / source) @ _BRADFORD
+        found = np.linalg.inv(ours) @ adapted @ theirs
+    if not np.isfinite(found).all():
+        raise ValueError("its primaries are no colours")
+    return found
+
+
+def _to_xyz(chromaticities: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The 3×3 matrix from linear RGB to CIE XYZ, where white has a luminance of 1."""
+    x, y = chromaticities.reshape(4, 2).T
+    xyz = np.stack([x / y, np.ones(4), (1 - x - y) / y])
+    try:
+        return xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
+    except np.linalg.LinAlgError:
+        raise ValueError("its primaries are no colours") from None
 
 
 def _floating(value: ArrayLike) -> NDArray[Any]:

@@ -79,6 +79,18 @@ class Volume:
         x, y, z = np.linalg.norm(self.index_to_world[:3, :3], axis=0)
         return float(x), float(y), float(z)
 
+    @property
+    def cell_length(self) -> float:
+        """World length of the edge of a cube as large as a cell."""
+        return float(np.cbrt(abs(np.linalg.det(self.index_to_world[:3, :3]))))
+
+    @property
+    def cells_to_world(self) -> AnyArray:
+        """4×4 like `index_to_world`, for cells counted from the first of the arrays."""
+        matrix = self.index_to_world.copy()
+        matrix[:3, 3] += matrix[:3, :3] @ self.origin
+        return matrix
+
     def refined(self, factor: int) -> "Volume":
         """The same smoke in the same place, on a grid `factor` times as fine along each axis.
 

@@ -1,7 +1,9 @@
+import dataclasses
 import json
 import math
 import struct
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +14,13 @@ from hypothesis import strategies as st
 from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
+from vnca.automaton.decoder import Decoder
 from vnca.automaton.model import MODEL_NAME, Model, from_record
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import FileFormatError, ModelError, OptionError, OutputError, ShapeError
 from vnca.io.smoke_format import SmokeFormat
-from vnca.typing import AnyArray
+from vnca.lattice import Lattice, Region
+from vnca.typing import AnyArray, Box
 
 
 @pytest.fixture
@@ -57,6 +61,112 @@ def test_a_model_comes_back_as_it_was_saved(model: Model, tmp_path: Path) -> Non
     np.testing.assert_array_equal(back.style, model.style)
 
 
+def with_decoder(model: Model) -> Model:
+    decoder = Decoder.initial(model.rule.config.channels, units=6, seed=2)
+    return replace(model, rule=replace(model.rule, decoder=decoder))
+
+
+def version_of(path: Path) -> int:
+    with safe_open(path, framework="numpy") as file:
+        return json.loads(file.metadata()["vnca"])["format_version"]
+
+
+def test_a_decoder_comes_back_as_it_was_saved(model: Model, tmp_path: Path) -> None:
+    path = tmp_path / MODEL_NAME
+    decoded = with_decoder(model)
+    decoded.save(path)
+    assert version_of(path) == 2
+    back = Model.load(path).rule.decoder
+    assert back is not None
+    assert decoded.rule.decoder is not None
+    for array, expected in zip(back.weights, decoded.rule.decoder.weights, strict=True):
+        assert array.dtype == np.float32
+        assert array.tobytes() == expected.tobytes()
+
+
+def test_a_model_without_a_decoder_can_be_read_by_earlier_versions(
+    model: Model, tmp_path: Path
+) -> None:
+    path = tmp_path / MODEL_NAME
+    model.save(path)
+    assert version_of(path) == 1
+    assert Model.load(path).rule.decoder is None
+    rewritten(path, format_version=2)
+    assert Model.load(path).rule.decoder is None
+
+
+@pytest.mark.parametrize(
+    ("name", "tensor", "words"),
+    [
+        ("decoder.third", None, r"damaged.*'decoder\.third'"),
+        ("decoder.second_bias", np.zeros(6, np.int8), r"'decoder\.second_bias': expected floats"),
+        ("decoder.second_bias", np.full(6, -1e300), "'second_bias': not all finite"),
+        ("decoder.third", np.zeros((6, 5), np.float32), "'third': .* fits no network"),
+        ("decoder.first", np.zeros((6, 4), np.float32), "expected 5 channels as the rule has"),
+        ("decoder.first", np.zeros((6, 0), np.float32), "'first': .* fits no network"),
+        ("decoder.first", np.zeros((), np.float32), "'first': .* fits no network"),
+        ("decoder.output", np.zeros((5, 6), np.float32), "'output': .* fits no network"),
+    ],
+)
+def test_a_decoder_that_cannot_be_used_is_one_clear_line(
+    model: Model, tmp_path: Path, name: str, tensor: AnyArray | None, words: str
+) -> None:
+    path = tmp_path / MODEL_NAME
+    with_decoder(model).save(path)
+    with safe_open(path, framework="numpy") as file:
+        metadata = file.metadata()
+    tensors = load_file(path)
+    del tensors[name]
+    save_file(tensors if tensor is None else {**tensors, name: tensor}, path, metadata=metadata)
+    with pytest.raises(ModelError, match=words) as caught:
+        Model.load(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_model_tells_where_it_was_trained_and_older_ones_need_not(
+    model: Model, tmp_path: Path
+) -> None:
+    to_world = np.array([[0.1, 0, 0, 1 / 3], [0, 0.1, 0, -7], [0, 0, 0.1, 0], [0, 0, 0, 1.0]])
+    place = Region(Lattice(to_world), Box((-4, 0, 2), (5, 9, 30)))
+    path = tmp_path / MODEL_NAME
+    dataclasses.replace(model, rule=dataclasses.replace(model.rule, place=place)).save(path)
+    back = Model.load(path).rule.place
+    assert back is not None
+    assert back.box == place.box
+    np.testing.assert_array_equal(back.lattice.to_world, to_world)
+    rewritten(path, place=None)
+    assert Model.load(path).rule.place is None
+
+
+PLACE = {"lattice_to_world": np.eye(4).tolist(), "box": [[0, 0, 0], [2, 3, 4]]}
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        3,
+        {"box": [[0, 0, 0], [2, 3, 4]]},
+        {**PLACE, "lattice_to_world": np.eye(3).tolist()},
+        {**PLACE, "lattice_to_world": np.diag([1, 0, 1, 1]).tolist()},
+        {**PLACE, "lattice_to_world": np.diag([1, 1e300, 1, 1]).tolist()},
+        {**PLACE, "lattice_to_world": np.diag([1, np.nan, 1, 1]).tolist()},
+        {**PLACE, "lattice_to_world": np.diag([1, 1, 1, 2]).tolist()},
+        {**PLACE, "lattice_to_world": [[1], [2, 3]]},
+        {**PLACE, "box": [[0, 0, 0], [2, 0, 4]]},
+        {**PLACE, "box": [[0, 0, 0], [2, 1.5, 4]]},
+        {**PLACE, "box": [[0, 0], [2, 1]]},
+        {**PLACE, "box": [[0, 0, 0], [2, 1, 10**30]]},
+    ],
+)
+def test_a_place_that_is_nowhere_is_damage(model: Model, tmp_path: Path, place: Any) -> None:
+    path = tmp_path / MODEL_NAME
+    model.save(path)
+    rewritten(path, place=place)
+    with pytest.raises(ModelError, match="damaged"):
+        Model.load(path)
+
+
 def test_saving_twice_gives_the_same_bytes(model: Model, tmp_path: Path) -> None:
     model.save(tmp_path / "a.safetensors")
     model.save(tmp_path / "b.safetensors")
@@ -75,7 +185,7 @@ def rewritten(path: Path, **changes: Any) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"format_version": 2}, r"newer than this vnca reads.*upgrade"),
+        ({"format_version": 3}, r"newer than this vnca reads.*upgrade"),
         ({"format_version": "one"}, "damaged"),
         ({"rule": None}, "damaged"),
         ({"rule": 3}, "damaged"),

@@ -7,6 +7,8 @@ from vnca.automaton.paint import colours, density_factors
 from vnca.automaton.priors import priors, told_velocity
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.colour import linear_to_srgb
+from vnca.lattice import Lattice, Region
+from vnca.typing import Box
 from vnca.volume import Volume
 
 SHAPE = (4, 2, 3)
@@ -37,6 +39,41 @@ def test_cells_are_told_position_density_and_velocity() -> None:
     np.testing.assert_allclose(values[..., 3], volume.density / 0.5)
     assert volume.velocity is not None
     np.testing.assert_allclose(values[..., 4:], volume.velocity / 2)
+
+
+def placed(box: Box, to_world: np.ndarray) -> Rule:
+    return dataclasses.replace(rule(), place=Region(Lattice(to_world), box))
+
+
+def test_cells_have_their_position_where_the_rule_was_trained_whatever_box_they_live_in() -> None:
+    volume = smoke()
+    domain = Domain.from_mask(np.ones(SHAPE, bool), volume.origin)
+    expected = priors(domain, volume, rule())
+    trained = placed(domain.box, volume.index_to_world)
+    larger = dataclasses.replace(domain, box=domain.box.grown(9))
+    np.testing.assert_array_equal(priors(larger, volume, trained), expected)
+    assert not np.array_equal(priors(larger, volume, rule()), expected)
+    # On other cells of the same world, and finer ones, too.
+    moved = np.diag([0.5, 0.5, 0.5, 1.0])
+    moved[:3, 3] = 1, 2, 3
+    box = Box((8, -8, -6), (16, -4, 0))  # of cells half as large, at the same place
+    trained = placed(box, moved)
+    np.testing.assert_allclose(
+        priors(larger, volume, trained)[:, 2], expected[:, 2] - 1 / 6, atol=1e-6
+    )
+    fine = volume.refined(2)
+    finer = Domain.from_mask(np.ones(fine.density.shape, bool), fine.origin)
+    told = priors(finer, fine, placed(domain.box, volume.index_to_world))
+    plain = priors(finer, fine, rule())
+    np.testing.assert_allclose(told[:, :3], plain[:, :3], atol=1e-6)
+
+
+def test_cells_beyond_where_the_rule_was_trained_are_told_to_be_at_its_border() -> None:
+    volume = smoke()
+    domain = Domain.from_mask(np.ones(SHAPE, bool), volume.origin)
+    told = priors(domain, volume, placed(Box((6, -2, 0), (7, 0, 3)), volume.index_to_world))
+    columns = domain.scatter(told, domain.box)[:, 0, 0, 0]
+    np.testing.assert_allclose(columns, [-1, 0, 1, 1])
 
 
 def test_a_rule_is_told_the_same_on_a_finer_grid_in_steps_that_last_less() -> None:

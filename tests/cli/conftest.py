@@ -21,7 +21,7 @@ from vnca.volume import Volume
 TINY = (
     *("--iterations", "2", "--hidden", "8", "--channels", "6", "--view.size", "32"),
     *("--shortest-rollout", "2", "--longest-rollout", "3", "--appearance.samples", "64"),
-    *("--appearance.layers", "relu1_1", "relu2_1", "--device", "cpu"),
+    *("--appearance.layers", "stem", "block1", "--device", "cpu"),
     *("--texture", "0"),
 )
 """Options of a training that takes a moment."""

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from safetensors.numpy import load_file, save_file
 
 from vnca.automaton.model import MODEL_NAME
+from vnca.features.efficientnet import EfficientNet
 from vnca.features.vgg import VGG16
 from vnca.io.smoke import write_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
@@ -43,7 +45,8 @@ def no_long_work(monkeypatch: pytest.MonkeyPatch) -> None:
     def begin(*_: object, **__: object) -> None:
         pytest.fail("long work began before the mistake was found")
 
-    monkeypatch.setattr(VGG16, "load", begin)
+    for network in (EfficientNet, VGG16):
+        monkeypatch.setattr(network, "load", begin)
     monkeypatch.setattr(Trainer, "improve", begin)
     monkeypatch.setattr("vnca.stylize.roll.Roll.paint", begin)
     monkeypatch.setattr("vnca.cli.render.read_colour", begin)
@@ -114,6 +117,29 @@ def test_a_picture_that_is_none(
     style.write_bytes(content)
     assert f"{style}: " in vnca("train", frame, style, "--out", out).complaint
     assert "picture" in vnca("demo", "--style", style, "--out", out).complaint
+
+
+@pytest.mark.parametrize(
+    ("size", "colour", "line"),
+    [
+        ((64, 64), (0, 0, 0, 0), "fully transparent"),
+        ((64, 64), (9, 99, 199, 255), "a single colour"),
+        ((1, 1), (9, 99, 199, 255), "1×1 pixels"),
+    ],
+)
+@pytest.mark.usefixtures("no_long_work")
+def test_a_picture_from_which_nothing_can_be_learned(
+    vnca: Vnca, frame: Path, style: Path, out: Path, size: Any, colour: Any, line: str
+) -> None:
+    Image.new("RGBA", size, colour).save(style)
+    for arguments in (
+        ("train", frame, style, "--out", out),
+        ("texture", "train", style, "--out", out),
+        ("demo", "--style", style, "--out", out),
+    ):
+        complaint = vnca(*arguments).complaint
+        assert f"{style}: the picture " in complaint
+        assert line in complaint
 
 
 def test_a_file_of_smoke_of_another_kind(vnca: Vnca, model: Path, style: Path, out: Path) -> None:
@@ -382,6 +408,8 @@ def test_unknown_commands_and_options(vnca: Vnca, arguments: list[str]) -> None:
         ("--view.size", "8"),
         ("--pool.size", "0"),
         ("--appearance.style", "-1"),
+        ("--appearance.layers", "relu1_1"),
+        ("--appearance.style-scale", "0"),
         ("--preview-every", "0"),
         ("--device", "toaster"),
         ("--device", "meta"),

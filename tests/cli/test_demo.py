@@ -20,7 +20,7 @@ Vnca = Callable[..., Any]
 TINY = TrainConfig(
     rule=RuleConfig(channels=6, hidden=8, position_prior=False),
     view=ViewConfig(size=32),
-    appearance=AppearanceConfig(samples=64, layers=("relu1_1", "relu2_1")),
+    appearance=AppearanceConfig(samples=64, layers=("stem", "block1")),
     iterations=2,
     shortest_rollout=2,
     longest_rollout=3,

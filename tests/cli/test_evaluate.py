@@ -9,14 +9,18 @@ from xml.etree import ElementTree
 import pytest
 
 from vnca.automaton.model import MODEL_NAME
+from vnca.errors import BackendUnavailableError
+from vnca.features.load import load_network
+from vnca.features.network import FeatureNetwork
 
 Vnca = Callable[..., Any]
 FEW = ("--warmup", "4", "--steps-per-frame", "2")
 SMALL = ("--size", "64", "--style-scale", "1", *FEW)
 NAMES = {
-    "style.gap_closed", "views.spread", "views.reprojection", "time.warp_short", "time.warp_long",
+    "style.gap_closed", "style.by_edges", "style.by_efficientnet",
+    "views.spread", "views.reprojection", "time.warp_short", "time.warp_long",
     "time.flow", "motion.direction", "motion.magnitude", "motion.transport",
-    "density.mass_change", "density.moved", "density.appeared",
+    "density.mass_change", "density.moved",
 }  # fmt: skip
 
 
@@ -61,7 +65,7 @@ def test_a_report_has_every_measure_and_needs_nothing_else(
             assert name == "time.warp_long"
             assert measure["reason"] == "it takes 8 frames in a row"
     assert measures["time.warp_short"]["ratio"] > 0
-    assert measures["density.appeared"]["value"] == 0
+    assert measures["style.by_edges"]["trained_with"] is None  # an old file does not tell
     assert set(measures["density.moved"]["frames"]) == {"1", "2", "3"}
     assert len(measures["views.spread"]["views"]) == 32
     assert {"network", "dis", "unit"} <= set(measures["motion.direction"])
@@ -90,6 +94,10 @@ def test_what_a_run_was_trained_on_is_what_it_is_measured_on(
     assert outcome.code == 0, outcome.err
     measures = json.loads((run / "evaluation" / "report.json").read_text())
     assert list(measures["style.gap_closed"]["frames"]) == ["2"]
+    assert "trained with features 'efficientnet'" in outcome.err
+    assert measures["style.by_efficientnet"]["trained_with"] is True
+    assert measures["style.by_edges"]["trained_with"] is False
+    assert list(measures["style.by_edges"]["frames"]) == ["2"]
     assert measures["time.warp_short"]["reason"] == "it takes 2 frames in a row"
     assert "Not measured" in (run / "evaluation" / "report.html").read_text()
     # The picture is compared as large as it was shown in training: as a finer grid has it.
@@ -113,6 +121,28 @@ def test_smoke_without_velocity_is_measured_as_far_as_it_goes(
         *("motion.direction", "motion.magnitude", "motion.transport"),
     }
     assert "no velocity" in measures["motion.direction"]["reason"]
+
+
+def test_a_judge_that_is_not_installed_is_left_out_with_a_reason(
+    vnca: Vnca,
+    model: Path,
+    frame: Path,
+    style: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def load(name: str) -> FeatureNetwork:
+        if name == "edges":
+            raise BackendUnavailableError("features 'edges': not installed")
+        return load_network(name)
+
+    monkeypatch.setattr("vnca.cli.evaluate.load_network", load)
+    out = ("--out", tmp_path, "--style", style, "--velocity-grid", "none", *SMALL)
+    assert vnca("evaluate", model, frame, *out).code == 0
+    measures = json.loads((tmp_path / "report.json").read_text())
+    assert measures["style.by_edges"]["value"] is None
+    assert measures["style.by_edges"]["reason"] == "features 'edges': not installed"
+    assert measures["style.by_efficientnet"]["value"] is not None
 
 
 @pytest.mark.parametrize(

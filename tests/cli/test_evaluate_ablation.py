@@ -4,8 +4,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 
 from vnca.automaton.model import Model
+from vnca.training.checkpoint import CHECKPOINT_NAME
 
 Vnca = Callable[..., Any]
 SMALL = ("--size", "32")
@@ -53,3 +55,61 @@ def test_an_ablation_of_motion_needs_a_motion_loss(
     )
     assert "--motion.weight" in outcome.complaint
     assert not list(tmp_path.glob("*/model.safetensors"))
+
+
+@pytest.fixture
+def ablation(vnca: Vnca, style: Path, tiny: list[str], tmp_path: Path) -> Callable[..., Any]:
+    """An ablation with one seed in a folder: `ablation(frame, more options)`."""
+
+    def run(frame: Path, *options: object, picture: Path = style) -> Any:
+        command = ("evaluate", frame, picture, "--ablation", "velocity", "--seeds", "0")
+        return vnca(*command, "--out", tmp_path / "runs", *SMALL, *tiny, *options)
+
+    return run
+
+
+def stamps(folder: Path) -> dict[str, int]:
+    return {str(path): path.stat().st_mtime_ns for path in sorted(folder.rglob("*.*"))}
+
+
+def test_runs_of_something_else_are_refused_and_kept(
+    ablation: Callable[..., Any], frame: Path, style: Path, tmp_path: Path
+) -> None:
+    weight = ("--motion.weight", "0.5")
+    assert ablation(frame, *weight).code == 0
+    before = stamps(tmp_path / "runs")
+    other_picture = tmp_path / "other.png"
+    with Image.open(style) as image:
+        image.transpose(Image.Transpose.FLIP_LEFT_RIGHT).save(other_picture)
+    for words, outcome in {
+        "differs in its frame;": ablation(frame.with_name("ball_0003.vdb"), *weight),
+        "differs in its style picture;": ablation(frame, *weight, picture=other_picture),
+        "no_motion_loss-0: holds a run that differs in its options;": ablation(
+            frame, *weight, "--learning-rate", "2e-3"
+        ),
+        "encoding-0: holds a run that differs in its options;": ablation(
+            frame, "--motion.weight", "0.6"
+        ),
+    }.items():
+        assert words in outcome.complaint
+        assert "choose another --out" in outcome.complaint
+    assert stamps(tmp_path / "runs") == before
+
+
+def test_a_run_that_was_interrupted_is_trained_again_and_one_that_tells_nothing_is_kept(
+    ablation: Callable[..., Any], frame: Path, tmp_path: Path
+) -> None:
+    weight = ("--motion.weight", "0.5")
+    assert ablation(frame, *weight).code == 0
+    both = tmp_path / "runs" / "both-0"
+    before = stamps(tmp_path / "runs")
+    (both / CHECKPOINT_NAME).write_bytes(b"")  # There while it is under way.
+    again = ablation(frame, *weight)
+    assert again.code == 0, again.err
+    assert "both, seed 0" in again.err
+    assert "no motion loss, seed 0" not in again.err
+    after = stamps(tmp_path / "runs")
+    changed = {path for path in after if before.get(path) != after[path]}
+    assert {Path(path).parent.name for path in changed} == {"both-0"}
+    (both / "config.json").unlink()
+    assert "both-0: holds a run that does not tell" in ablation(frame, *weight).complaint

@@ -4,6 +4,7 @@ import os
 import shutil
 import signal
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from PIL import Image
 from vnca.automaton.model import MODEL_NAME, Model
 from vnca.automaton.rule import Rule
 from vnca.io.sequence import find_frames
+from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.kernels.update import native
 from vnca.stylize.roll import Painting, Roll, RollState
 from vnca.stylize.unfinished import Unfinished
@@ -194,6 +196,7 @@ def without_a_painted_frame(painted: Painted) -> None:
         (["--domain", "box"], '--domain is another than when the painting was begun ("active", '),
         (["--strength", 0.5], "--strength"),
         (["--density-scale", 0.5], "--density-scale"),
+        (["--gamma", 2], "--gamma is another than when the painting was begun (0.7, now 2.0)"),
         (["--colour-grid", "color"], "--colour-grid"),
         (["--backend", "reference"], "--backend"),
         pytest.param(["--precision", "bfloat16"], "--precision", marks=needs_bfloat16),
@@ -223,7 +226,7 @@ def test_what_does_not_touch_the_files_may_be_another(
     unfinished: Painted, unharmed: dict[str, bytes], tmp_path: Path
 ) -> None:
     film = ("--preview", tmp_path / "film.gif", "--film.rows", 32, "--film.columns", 32)
-    assert unfinished.run("--resume", *film, "--gamma", 2, "--on-error", "hold").code == 0
+    assert unfinished.run("--resume", *film, "--on-error", "hold").code == 0
     assert unfinished.files == unharmed
 
 
@@ -335,3 +338,22 @@ def test_keeping_the_state_takes_little_time(
     during(1, painting)
     assert painted.run().code == 0
     assert saved == ([1, 3] if seconds == 1 else [1, 2, 3])
+
+
+def test_a_painting_does_not_go_on_where_its_cells_lie_elsewhere(
+    painted: Painted, smoke: Path, during: During
+) -> None:
+    """The first frame was broken, and tells now of other cells than those that were painted on."""
+    first = smoke / "ball_0001.vdb"
+    whole = first.read_bytes()
+    first.write_bytes(whole[:100])
+    during(2, control_c)
+    assert painted.run("--on-error", "skip").code == 130
+    first.write_bytes(whole)
+    volume = read_smoke(first, SmokeFormat())
+    matrix = volume.index_to_world.copy()
+    matrix[0, 3] += 0.03
+    write_smoke(first, replace(volume, index_to_world=matrix))
+    outcome = painted.run("--on-error", "skip", "--resume")
+    assert outcome.code == 2
+    assert "since the place of its cells in the world is another" in outcome.err

@@ -23,7 +23,7 @@ SMALL = ("--block", 16, "--steps", 6)
 TINY = (
     *("--block", 16, "--slice.size", 32, "--slice.count", 2, "--hidden", 8, "--channels", 6),
     *("--iterations", 2, "--shortest-rollout", 2, "--longest-rollout", 3, "--device", "cpu"),
-    *("--appearance.samples", 64, "--appearance.layers", "relu1_1", "relu2_1"),
+    *("--appearance.samples", 64, "--appearance.layers", "stem", "block1"),
 )
 
 
@@ -90,6 +90,20 @@ def test_meshes_of_every_format_are_textured(
     picture = np.asarray(shape.visual.material.baseColorTexture)
     assert picture.shape == (128, 128, 3)
     assert picture.std() > 5
+
+
+def test_unusable_uvs_are_told_of_and_replaced(vnca: Vnca, texture: Path, tmp_path: Path) -> None:
+    source = Path(__file__).parents[1] / "data/uv_zero.glb"
+    out = tmp_path / "out.glb"
+    arguments = ("texture", "bake", texture, source, "--out", out, "--size", 64, *SMALL)
+    assert "0.00% of the texture" in vnca(*arguments, "--unwrap", "never").complaint
+    assert not out.exists()
+    outcome = vnca(*arguments)
+    assert outcome.code == 0, outcome.err
+    assert "uv_zero.glb: its UVs cannot be used (they cover 0.00% of the texture)" in outcome.err
+    assert "new UVs" in outcome.err
+    (shape,) = trimesh.load_scene(out).geometry.values()
+    assert np.asarray(shape.visual.material.baseColorTexture).std() > 5
 
 
 def test_same_seed_same_texture_and_another_seed_another(

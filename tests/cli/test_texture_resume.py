@@ -18,7 +18,7 @@ Begin = Callable[..., Path]
 TINY = (
     *("--block", 16, "--slice.size", 32, "--slice.count", 2, "--hidden", 8, "--channels", 6),
     *("--iterations", 4, "--preview-every", 3, "--shortest-rollout", 2, "--longest-rollout", 3),
-    *("--appearance.samples", 64, "--appearance.layers", "relu1_1", "relu2_1", "--device", "cpu"),
+    *("--appearance.samples", 64, "--appearance.layers", "stem", "block1", "--device", "cpu"),
 )
 
 

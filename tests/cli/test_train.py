@@ -54,7 +54,9 @@ def test_a_run_leaves_a_model_its_configuration_previews_and_curves(trained: Run
     assert model.rule.output.any()
     config = resolved(run)
     assert config["config"]["view"]["size"] == 32
-    assert config["config"]["features"] == "edges"
+    assert config["config"]["features"] == "efficientnet"
+    assert model.training["features"] == "efficientnet"
+    assert model.training["picture_cells"] == config["picture_cells"] > 0
     assert config["device"] == "cpu"
     assert {"vnca", "torch", "seed"} <= set(config)
     with Image.open(run / "preview_000002.png") as picture:

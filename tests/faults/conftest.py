@@ -93,7 +93,7 @@ def training(tiny_smoke: Volume, tmp_path_factory: pytest.TempPathFactory) -> li
         image.convert("RGB").resize((40, 50)).save(folder / "style.png")
     quick = (
         *("--iterations", 12, "--preview-every", 5, "--hidden", 8, "--channels", 6),
-        *("--appearance.layers", "relu1_1", "relu2_1", "--appearance.samples", 64),
+        *("--appearance.layers", "stem", "block1", "--appearance.samples", 64),
         *("--view.size", 32, "--shortest-rollout", 2, "--longest-rollout", 5),
         *("--pool.size", 4, "--device", "cpu", "--texture", 0),
     )

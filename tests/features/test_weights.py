@@ -1,4 +1,4 @@
-"""Where VGG16's weights come from, what is cached, and what happens when they are not there."""
+"""Where VGG's weights come from, what is cached, and what happens when they are not there."""
 
 import hashlib
 import importlib.metadata
@@ -6,7 +6,9 @@ import socket
 import sys
 import time
 from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 from types import SimpleNamespace
 
 import h5py
@@ -16,9 +18,11 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
-from vnca.errors import BackendUnavailableError, FileFormatError, OptionError
+from vnca.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
+from vnca.features import download
 from vnca.features import weights as module
-from vnca.features.weights import CONVOLUTIONS, load_weights, save_weights
+from vnca.features.vgg import STYLE_LAYERS, VGG16
+from vnca.features.weights import CONVOLUTIONS, convolutions, load_weights, save_weights
 
 TORCHVISION_INDICES = (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28)
 
@@ -177,7 +181,7 @@ def test_silent_server_is_given_up_soon(
     silent_server: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "imagenet_url", lambda: silent_server)
-    monkeypatch.setattr(module, "CONNECT_SECONDS", 0.2)
+    monkeypatch.setattr(download, "CONNECT_SECONDS", 0.2)
     monkeypatch.setenv("no_proxy", "*")
     started = time.monotonic()
     with pytest.raises(BackendUnavailableError, match=r"no answer.*--features edges"):
@@ -191,6 +195,87 @@ def test_refused_connection_names_the_alternatives(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(module, "imagenet_url", lambda: f"http://127.0.0.1:{port}/vgg16.pth")
     monkeypatch.setenv("no_proxy", "*")
     with pytest.raises(BackendUnavailableError, match=r"refused.*--features edges.*path"):
+        load_weights("imagenet")
+
+
+class Server(ThreadingHTTPServer):
+    """Has one file, of which it may send a part only; remembers what was asked for."""
+
+    def __init__(self, content: bytes) -> None:
+        super().__init__(("127.0.0.1", 0), Answer)
+        self.content, self.sends, self.understands_ranges = content, len(content), True
+        self.ranges: list[str | None] = []
+
+
+class Answer(BaseHTTPRequestHandler):
+    server: Server  # pyright: ignore
+
+    def do_GET(self) -> None:
+        asked, content = self.headers.get("Range"), self.server.content
+        self.server.ranges.append(asked)
+        start = int(asked.removeprefix("bytes=").removesuffix("-")) if asked else 0
+        start *= self.server.understands_ranges
+        if start >= len(content):
+            self.send_error(416)
+            return
+        self.send_response(206 if start else 200)
+        self.send_header("Content-Length", str(len(content) - start))
+        self.end_headers()
+        self.wfile.write(content[start : self.server.sends])
+
+    def log_message(self, *_: object) -> None:  # pyright: ignore
+        pass
+
+
+@pytest.fixture
+def server(pth: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
+    """Has ImageNet's VGG16, or what is taken for it here."""
+    monkeypatch.setenv("no_proxy", "*")
+    monkeypatch.setattr(module, "IMAGENET_SHA256", sha256(pth)[:8])
+    with Server(pth.read_bytes()) as server:
+        url = f"http://127.0.0.1:{server.server_port}/vgg16.pth"
+        monkeypatch.setattr(module, "imagenet_url", lambda: url)
+        Thread(target=server.serve_forever, daemon=True).start()
+        yield server
+        server.shutdown()
+
+
+@pytest.mark.parametrize("understands", [True, False], ids=["ranges", "no ranges"])
+def test_a_download_that_broke_off_goes_on_where_it_did(
+    server: Server, cache: Path, understands: bool
+) -> None:
+    server.sends, server.understands_ranges = 20_000_000, understands
+    with pytest.raises(BackendUnavailableError, match=r"broke off.*20 of 59 MB.*kept"):
+        load_weights("imagenet")
+    assert (cache / "vgg16.pth.part").stat().st_size == 20_000_000
+    server.sends = len(server.content)
+    assert load_weights("imagenet").name == "imagenet"
+    assert server.ranges == [None, "bytes=20000000-"]
+    assert [path.name for path in cache.iterdir()] == ["vgg16_imagenet.safetensors"]
+
+
+def test_a_download_that_was_whole_is_not_fetched_again(server: Server, cache: Path) -> None:
+    cache.mkdir()
+    (cache / "vgg16.pth.part").write_bytes(server.content)
+    assert load_weights("imagenet").name == "imagenet"
+    assert server.ranges == [f"bytes={len(server.content)}-"]
+
+
+def test_what_broke_off_and_does_not_fit_is_thrown_away(server: Server, cache: Path) -> None:
+    cache.mkdir()
+    (cache / "vgg16.pth.part").write_bytes(bytes(1000))
+    with pytest.raises(BackendUnavailableError, match=r"damaged.*try again"):
+        load_weights("imagenet")
+    assert load_weights("imagenet").name == "imagenet"
+
+
+def test_a_cache_that_cannot_be_written_is_told(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    del server
+    (tmp_path / "file").write_text("not a folder")
+    monkeypatch.setenv("VNCA_CACHE", str(tmp_path / "file" / "cache"))
+    with pytest.raises(OutputError, match=r"vgg16\.pth\.part: cannot be written"):
         load_weights("imagenet")
 
 
@@ -216,6 +301,54 @@ def test_other_pytorch_files_take_torchvisions_usual_input(
     blue = loaded.tensors["conv1_1.weight"][:, 2]
     torch.testing.assert_close(blue, torchvision_state["features.0.weight"][:, 2] / 0.225)
     assert torch.equal(loaded.tensors["conv5_3.bias"], torchvision_state["features.28.bias"])
+
+
+def vgg19_state() -> dict[str, Tensor]:
+    """VGG19 as far as `conv5_1`, each convolution with a bias of its own."""
+    state = {}
+    for at, (conv, (inputs, outputs)) in enumerate(convolutions(19).items()):
+        state[f"{conv}.weight"] = torch.full((outputs, inputs, 3, 3), 1e-4)
+        state[f"{conv}.bias"] = torch.full((outputs,), float(at))
+        if conv == "conv5_1":
+            break
+    return state
+
+
+def test_vgg19_is_known_by_its_convolutions(tmp_path: Path) -> None:
+    """With torchvision's keys, or those that Keras gives, which stand for BGR in 0–255."""
+    state = vgg19_state()
+    places = (0, 2, 5, 7, 10, 12, 14, 16, 19, 21, 23, 25, 28)
+    torchvision = {
+        f"features.{place}.{kind}": state[f"{conv}.{kind}"]
+        for place, conv in zip(places, convolutions(19), strict=False)
+        for kind in ("weight", "bias")
+    }
+    torch.save(torchvision, tmp_path / "vgg19.pth")
+    state["conv1_1.weight"] = torch.arange(3.0)[None, :, None, None].expand(64, 3, 3, 3)
+    keras = {
+        f"block{key[4]}_conv{key[6:]}": value.half().contiguous() for key, value in state.items()
+    }
+    save_file(keras, tmp_path / "vgg19.safetensors")
+    for name in ("vgg19.pth", "vgg19.safetensors"):
+        loaded = load_weights(str(tmp_path / name))
+        assert (loaded.name, loaded.depth) == (name, 19)
+        assert loaded.tensors["conv5_1.bias"][0] == 12
+        assert loaded.origin == sha256(tmp_path / name)
+    assert loaded.mean == pytest.approx((0.485, 0.458, 0.408), abs=1e-3)  # pyright: ignore
+    red, green, blue = loaded.tensors["conv1_1.weight"][0, :, 0, 0].tolist()  # pyright: ignore
+    assert (red, green, blue) == (510, 255, 0)
+    network = VGG16(loaded)  # pyright: ignore
+    assert list(network.convolutions)[-1] == "conv5_1"
+    assert len(network.features(torch.rand(1, 3, 32, 32), STYLE_LAYERS)) == 5
+    with pytest.raises(OptionError, match=r"relu5_2.*relu3_4.*relu5_1;"):
+        network.features(torch.rand(1, 3, 32, 32), ["relu5_2"])
+
+
+def test_a_vgg_that_ends_too_soon_names_what_is_missing(tmp_path: Path) -> None:
+    state = {f"block{k[4]}_conv{k[6:]}": v for k, v in vgg19_state().items() if k[4] != "5"}
+    save_file(state, tmp_path / "short.safetensors")
+    with pytest.raises(FileFormatError, match=r"conv5_1\.weight.*found nothing"):
+        load_weights(str(tmp_path / "short.safetensors"))
 
 
 def test_own_file_keeps_where_it_came_from(pth: Path, tmp_path: Path) -> None:

@@ -1,3 +1,4 @@
+import base64
 import json
 import struct
 from contextlib import suppress
@@ -112,16 +113,124 @@ def test_zeros_without_bytes_are_not_made_without_end() -> None:
 @pytest.mark.parametrize(
     ("document", "line"),
     [
-        ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "compressed"),
+        ({"extensionsRequired": ["EXT_meshopt_compression"]}, r"compressed \(EXT_meshopt"),
         ({"buffers": [{"uri": "other.bin", "byteLength": 4}]}, "outside the file"),
     ],
 )
 def test_what_cannot_be_read_is_said(document: dict[str, Any], line: str) -> None:
-    text = json.dumps({"asset": {}, **document}).encode()
-    text += b" " * (-len(text) % 4)
-    data = struct.pack("<IIIII", 0x46546C67, 2, 20 + len(text), len(text), 0x4E4F534A) + text
     with pytest.raises(FileFormatError, match=line):
-        Glb.parse(data, NAME)
+        Glb.parse(packed(document), NAME)
+
+
+def packed(document: dict[str, Any], blob: bytes = b"", *, fill: bytes = b" ") -> bytes:
+    """A GLB file of which nothing is put right."""
+    text = json.dumps({"asset": {"version": "2.0"}, **document}).encode()
+    text += fill * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+    if blob:
+        chunks += struct.pack("<II", len(blob), 0x004E4942) + blob
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def as_uri(data: bytes) -> str:
+    return "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+
+
+NUMBERS = np.arange(6, dtype="<f4").reshape(2, 3)
+ACCESSOR = {"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 2}
+ONE_VIEW = {"bufferViews": [{"buffer": 0, "byteLength": 24}], "accessors": [ACCESSOR]}
+
+
+@pytest.mark.parametrize("more", [0, 1, 2, 3])
+def test_zeros_behind_the_json_are_no_damage(more: int) -> None:
+    document = {**ONE_VIEW, "buffers": [{"byteLength": 24}], "extras": "x" * more}
+    glb = Glb.parse(packed(document, NUMBERS.tobytes(), fill=b"\0"), NAME)
+    np.testing.assert_array_equal(glb.stored(0), NUMBERS)
+
+
+@pytest.mark.parametrize("more", [b"\0", b"\0" * 9, b"\xff" * 64, struct.pack("<II", 9999, 7)])
+def test_bytes_behind_the_end_that_the_file_names_are_ignored(more: bytes) -> None:
+    document = {**ONE_VIEW, "buffers": [{"byteLength": 24}]}
+    glb = Glb.parse(packed(document, NUMBERS.tobytes()) + more, NAME)
+    np.testing.assert_array_equal(glb.stored(0), NUMBERS)
+
+
+def test_a_length_that_the_file_never_wrote_is_no_damage() -> None:
+    data = bytearray(packed({**ONE_VIEW, "buffers": [{"uri": as_uri(NUMBERS.tobytes())}]}))
+    struct.pack_into("<I", data, 8, 0)
+    np.testing.assert_array_equal(Glb.parse(bytes(data), NAME).stored(0), NUMBERS)
+
+
+def test_buffers_that_are_text_join_the_binary_one() -> None:
+    views = [
+        {"buffer": 0, "byteLength": 24},
+        {"buffer": 1, "byteOffset": 8, "byteLength": 24},
+        {"buffer": 2, "byteLength": 24},
+    ]
+    unpadded = as_uri(bytes(8) + (2 * NUMBERS).tobytes()).rstrip("=")
+    percent = "data:," + "".join(f"%{byte:02x}" for byte in (3 * NUMBERS).tobytes())
+    document = {
+        "buffers": [{"byteLength": 24, "name": "first"}, {"uri": unpadded}, {"uri": percent}],
+        "bufferViews": views,
+        "accessors": [{**ACCESSOR, "bufferView": view} for view in range(3)],
+    }
+    glb = Glb.parse(packed(document, NUMBERS.tobytes()), NAME)
+    for each in (glb, reread(glb)):
+        for factor in (1, 2, 3):
+            np.testing.assert_array_equal(each.stored(factor - 1), factor * NUMBERS)
+    written = pygltflib.GLTF2.load_from_bytes(glb.to_bytes())
+    assert [buffer.uri for buffer in written.buffers] == [None]
+    assert glb.document["buffers"][0]["name"] == "first"
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        {"buffers": [{"uri": "data:;base64,@"}], **ONE_VIEW},
+        {"buffers": [{"uri": 7}], **ONE_VIEW},
+        {
+            "buffers": [{}, {"uri": as_uri(b"1234")}],
+            "bufferViews": [{"buffer": 1, "byteLength": 5}],
+        },
+        {"buffers": [{}], "bufferViews": [{"buffer": 3, "byteLength": 5}]},
+        {"buffers": [{"uri": as_uri(b"1234")}], **ONE_VIEW},
+    ],
+    ids=range(5),
+)
+def test_buffers_that_do_not_hold_what_they_should_are_damage(document: dict[str, Any]) -> None:
+    with pytest.raises(FileFormatError, match=r"some\.glb: damaged"):
+        Glb.parse(packed(document), NAME).stored(0)
+
+
+def test_plain_data_beside_what_meshopt_compressed_are_used() -> None:
+    extension = {"EXT_meshopt_compression": {"buffer": 1, "byteOffset": 0, "count": 2}}
+    document = {
+        "buffers": [{"byteLength": 24}],
+        "bufferViews": [{"buffer": 0, "byteLength": 24, "extensions": extension}],
+        "accessors": [ACCESSOR],
+        "extensionsUsed": ["EXT_meshopt_compression"],
+    }
+    glb = Glb.parse(packed(document, NUMBERS.tobytes()), NAME)
+    np.testing.assert_array_equal(glb.stored(0), NUMBERS)
+    assert b"meshopt" not in glb.to_bytes()
+
+
+def test_a_few_values_beside_none_are_read() -> None:
+    glb = made()
+    glb.add_bytes(bytes(999))
+    sparse = {
+        "count": 2,
+        "indices": {"bufferView": glb.add_bytes(b"\1\0\3\0"), "componentType": 5123},
+        "values": {"bufferView": glb.add_bytes(NUMBERS.tobytes())},
+    }
+    accessor = {"componentType": 5126, "type": "VEC3", "count": 4, "sparse": sparse}
+    glb.items("accessors").append(accessor)
+    expected = np.zeros((4, 3))
+    expected[[1, 3]] = NUMBERS
+    np.testing.assert_array_equal(reread(glb).stored(0), expected)
+    sparse["indices"]["bufferView"] = glb.add_bytes(b"\1\0\4\0")
+    with pytest.raises(FileFormatError, match="damaged"):
+        reread(glb).stored(0)
 
 
 def test_files_that_are_cut_off_are_refused() -> None:

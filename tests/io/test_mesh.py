@@ -13,6 +13,7 @@ from vnca.io.glb import Glb
 from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh_texture import base_colours
 
+DATA = Path(__file__).parents[1] / "data"
 BOX = trimesh.creation.box((1, 2, 3))
 
 
@@ -226,3 +227,39 @@ def test_an_obj_file_cannot_bring_pictures_from_elsewhere(tmp_path: Path) -> Non
             f"mtllib {library}\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",
         )
         assert all(colour.picture.shape == (1, 1, 3) for colour in base_colours(read_mesh(path)))
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [("nulpad.glb", 12.6965), ("datauri.glb", 12.6965), ("ngon.obj", 2.5)]
+)
+def test_files_of_the_field_have_the_area_they_should(name: str, expected: float) -> None:
+    assert area(read_mesh(DATA / name)) == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["i1", "u1", "<i2", "<u2"])
+@pytest.mark.parametrize("normalized", [True, False])
+def test_quantised_positions_are_put_where_their_node_says(
+    tmp_path: Path, kind: str, normalized: bool
+) -> None:
+    """KHR_mesh_quantization, as gltfpack writes it; trimesh scales nothing, so numpy judges."""
+    glb = Glb(tmp_path, {"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}]})
+    most = np.iinfo(kind).max
+    corners = np.array([[0, 0, 0], [most, 0, 0], [0, most, 0], [0, 0, most]], kind)
+    accessor = glb.add_array(corners, bounds=True)
+    scale = 2 if normalized else 2 / most
+    if normalized:
+        glb.item("accessors", accessor)["normalized"] = True
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], "u1")
+    primitive = {
+        "attributes": {"POSITION": accessor},
+        "indices": glb.add_array(faces.reshape(-1, 1)),
+    }
+    glb.document["meshes"] = [{"primitives": [primitive]}]
+    glb.document["nodes"] = [{"mesh": 0, "scale": [scale] * 3, "translation": [1, 1, 1]}]
+    for listed in ("extensionsUsed", "extensionsRequired"):
+        glb.document[listed] = ["KHR_mesh_quantization"]
+    glb.write(tmp_path / "q.glb")
+    mesh = read_mesh(tmp_path / "q.glb")
+    assert extents(mesh) == pytest.approx([2, 2, 2])
+    assert mesh.bounds[0].tolist() == pytest.approx([1, -3, 1])
+    assert area(mesh) == pytest.approx(3 * 2 + np.sqrt(3) / 4 * 8)

@@ -1,5 +1,8 @@
+import base64
 import io
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pygltflib
@@ -8,6 +11,7 @@ import trimesh
 from PIL import Image
 
 from vnca.colour import srgb_to_linear
+from vnca.errors import FileFormatError
 from vnca.io.glb import Glb
 from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh_texture import Unwrapping, base_colours, put_on, write_coloured
@@ -174,3 +178,87 @@ def test_vertex_colours_are_written_with_the_axes_of_the_file(tmp_path: Path, up
     written = trimesh.load_mesh(tmp_path / "coloured.ply", process=False)
     np.testing.assert_allclose(written.vertices, box.vertices, atol=1e-6)
     np.testing.assert_array_equal(written.visual.vertex_colors[:, :3], colour)
+
+
+def pictured(plain: Path, change: Callable[[Glb], object]) -> Path:
+    """The file with UVs, a picture, and what a change makes of it."""
+    mesh = read_mesh(plain)
+    path = textured(plain.parent, mesh)
+    glb = Glb.read(path)
+    change(glb)
+    glb.write(path)
+    return path
+
+
+def test_a_picture_that_is_text_in_the_file_is_read(plain: Path) -> None:
+    def change(glb: Glb) -> None:
+        uri = "data:image/png;base64," + base64.b64encode(png((9, 99, 199))).decode()
+        glb.document["images"] = [{"uri": uri}]
+
+    (colour,) = base_colours(read_mesh(pictured(plain, change)))
+    expected = srgb_to_linear(np.array([9, 99, 199]) / 255)
+    np.testing.assert_allclose(colour.picture[0, 0], expected, rtol=1e-6)
+
+
+def test_a_picture_of_another_format_is_found_beside_its_extension(plain: Path) -> None:
+    def change(glb: Glb) -> None:
+        stream = io.BytesIO()
+        Image.new("RGB", (4, 4), (9, 99, 199)).save(stream, "WEBP", lossless=True)
+        glb.items("images").append({"bufferView": glb.add_bytes(stream.getvalue())})
+        glb.document["textures"] = [{"extensions": {"EXT_texture_webp": {"source": 1}}}]
+
+    (colour,) = base_colours(read_mesh(pictured(plain, change)))
+    expected = srgb_to_linear(np.array([9, 99, 199]) / 255)
+    np.testing.assert_allclose(colour.picture[0, 0], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("image", "line"),
+    [
+        ({"uri": "wood.png"}, r"outside the file \(wood\.png\)"),
+        ({"uri": "data:,%abKTX 20"}, "kind that is not read .*graphics cards"),
+        ({"uri": "data:;base64,iVBORw0KGgo="}, "picture in it"),
+        ({"uri": None}, "damaged"),
+    ],
+)
+def test_a_picture_that_cannot_be_read_is_said(
+    plain: Path, image: dict[str, Any], line: str
+) -> None:
+    path = pictured(plain, lambda glb: glb.document.update(images=[image]))
+    with pytest.raises(FileFormatError, match=line):
+        base_colours(read_mesh(path))
+
+
+def test_a_texture_without_a_picture_is_damage(plain: Path) -> None:
+    path = pictured(plain, lambda glb: glb.document.update(textures=[{"extensions": {"X": {}}}]))
+    with pytest.raises(FileFormatError, match="damaged"):
+        base_colours(read_mesh(path))
+
+
+def test_uvs_go_where_the_transform_of_a_texture_puts_them(plain: Path) -> None:
+    transform = {"offset": [0.25, 0.5], "rotation": np.pi / 2, "scale": [0.5, 2]}
+
+    def change(glb: Glb) -> None:
+        info = glb.document["materials"][-1]["pbrMetallicRoughness"]["baseColorTexture"]
+        info["extensions"] = {"KHR_texture_transform": transform}
+
+    (colour,) = base_colours(read_mesh(pictured(plain, change)))
+    # A quarter turn anticlockwise where v goes down: (1, 0) is turned to (0, −1).
+    np.testing.assert_allclose(colour.uv[:3], [[0.25, 0.5], [0.25, 0], [2.25, 0.5]], atol=1e-9)
+
+
+def test_split_vertices_stay_quantised(tmp_path: Path) -> None:
+    glb = Glb(tmp_path, {"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}]})
+    corners = np.array([[0, 0, 0], [999, 0, 0], [0, 999, 0], [0, 0, 999]], "<u2")
+    attributes = {"POSITION": glb.add_array(corners, bounds=True)}
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], "u1").reshape(-1, 1)
+    primitive = {"attributes": attributes, "indices": glb.add_array(faces)}
+    glb.document["meshes"] = [{"primitives": [primitive]}]
+    glb.document["nodes"] = [{"mesh": 0}]
+    glb.write(tmp_path / "q.glb")
+    path = textured(tmp_path, read_mesh(tmp_path / "q.glb"))
+    (shape,) = trimesh.load_scene(path).geometry.values()
+    np.testing.assert_allclose(np.ptp(shape.vertices, axis=0), 999)
+    assert Glb.read(path).stored(attributes["POSITION"]).dtype == "<u2"
+    again = read_mesh(path).surfaces[0]
+    assert len(again.points) == 12

@@ -74,7 +74,7 @@ def test_interpolated_velocity_does_not_slow_down_at_the_border() -> None:
     finer = Lattice(np.diag([0.2, 0.2, 0.2, 1.0]))
     laid = on_lattice(smoke, finer, "it")
     assert laid.velocity is not None
-    np.testing.assert_allclose(laid.velocity[laid.density > 0] - [2.5, 5, 7.5], 0, atol=1e-5)
+    np.testing.assert_allclose(laid.velocity[laid.density > 0] - (2.5, 5, 7.5), 0, atol=1e-5)
 
 
 def test_frames_of_one_painting_lie_on_the_lattice_of_the_first_with_smoke() -> None:

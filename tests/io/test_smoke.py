@@ -347,6 +347,16 @@ def test_the_velocity_scale_is_fitted_to_neighbouring_frames(tmp_path: Path) -> 
     assert with_fitted_scale(PLAIN, frames) is PLAIN
     with pytest.raises(SequenceError, match="fit needs two neighbouring frames"):
         with_fitted_scale(form, frames[:2])
+    # Also where the grid moves along, and where its axes are others.
+    other = drifting(3, speed=4)
+    matrix = other.index_to_world.copy()
+    matrix[0, 3] = 0.7
+    write_smoke(frames[2].path, replace(other, origin=(-7, 0, 0), index_to_world=matrix))
+    assert with_fitted_scale(form, frames).velocity_scale == fitted.velocity_scale
+    matrix = np.diag([-0.1, 0.1, 0.1, 1.0])
+    density = np.ascontiguousarray(other.density[::-1])
+    write_smoke(frames[2].path, Volume(density, other.velocity, (-15, 0, 0), matrix, 3))
+    assert with_fitted_scale(form, frames).velocity_scale == fitted.velocity_scale
     write_smoke(frames[2].path, drifting(3, speed=-4))
     write_smoke(frames[1].path, drifting(2, speed=-4))
     with pytest.raises(GridError, match="no velocity scale up to 4"):

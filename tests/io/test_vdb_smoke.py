@@ -102,3 +102,28 @@ def test_sparse_smoke_in_a_large_box_becomes_an_array_when_it_is_asked_for(tmp_p
         _, _, box = read_density(file, SmokeFormat())
     assert box == ((0, 0, 0), (257, 257, 257))
     assert read_smoke(tmp_path / "a.vdb", SmokeFormat()).density.sum() == 2
+
+
+def test_a_velocity_that_may_lie_where_nothing_is_found_is_not_taken_for_none(
+    tmp_path: Path,
+) -> None:
+    path, active = tmp_path / "a.vdb", np.ones((2, 2, 2), bool)
+    grids = [
+        Grid.from_dense(
+            name, np.ones(shape, dtype), active, (0, 0, 0), transform=Transform.uniform(1)
+        )
+        for name, shape, dtype in (
+            ("density", (2, 2, 2), "f4"),
+            ("odd", (2, 2, 2), "f8"),
+            ("vel", (2, 2, 2, 3), "f4"),
+        )
+    ]
+    write_vdb(path, grids)
+    data = path.read_bytes().replace(b"Tree_double_5_4_3", b"Tree_points_5_4_3")
+    path.write_bytes(data)
+    assert read_vdb_smoke(path, SmokeFormat()).velocity is not None
+    path.write_bytes(data[:20] + b"\0" + data[21:])  # as a stream
+    listed = r"density \(float\), odd \(points\), 1 more that cannot be found behind it"
+    with pytest.raises(GridError, match=rf"a\.vdb: no velocity among {listed}.*--velocity-grid"):
+        read_vdb_smoke(path, SmokeFormat())
+    assert read_vdb_smoke(path, SmokeFormat(velocity_grid="none")).density.values.sum() == 8

@@ -294,7 +294,7 @@ def test_a_state_gone_wrong_stays_visible_and_local_with_triton() -> None:
 
 
 @needs_triton
-@pytest.mark.parametrize("probability", [0.5, 1.0])
+@pytest.mark.parametrize("probability", [0.5, 1 - 2.0**-40, 1.0])
 def test_the_mask_drawn_by_triton_has_the_same_bits(probability: float) -> None:
     from vnca.kernels.update import triton_mask
 

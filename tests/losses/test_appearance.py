@@ -1,6 +1,7 @@
 """Does the appearance loss tell how much a picture looks like the style image?"""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,17 +12,20 @@ from torch import Tensor
 import vnca
 from vnca.colour import linear_to_srgb, srgb_to_linear
 from vnca.errors import OptionError, ShapeError
-from vnca.features.vgg import VGG16
+from vnca.features.load import load_network
+from vnca.features.network import FeatureNetwork
 from vnca.losses.appearance import Appearance, AppearanceConfig, AppearanceLoss
+from vnca.losses.pixels import luminance
 from vnca.typing import FloatArray
 
 SIZE = 48
-LAYERS = ("relu1_1", "relu2_1", "relu3_1")  # the deeper ones take most of the time
+# The deeper ones take most of the time.
+LAYERS = {"edges": ("relu1_1", "relu2_1", "relu3_1"), "efficientnet": ("stem", "block1", "block3")}
 
 
-@pytest.fixture(scope="module")
-def vgg() -> VGG16:
-    return VGG16.load("edges", dtype=torch.float32)
+@pytest.fixture(scope="module", params=LAYERS)
+def network(request: pytest.FixtureRequest) -> FeatureNetwork:
+    return load_network(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +36,13 @@ def painting() -> FloatArray:
 
 
 @pytest.fixture(scope="module")
-def loss(vgg: VGG16, painting: FloatArray) -> AppearanceLoss:
-    return AppearanceLoss(vgg, painting, AppearanceConfig(layers=LAYERS), SIZE)
+def loss(network: FeatureNetwork, painting: FloatArray) -> AppearanceLoss:
+    return AppearanceLoss(network, painting, AppearanceConfig(**few(network)), SIZE)
+
+
+def few(network: FeatureNetwork, count: int = 3) -> dict[str, Any]:
+    """The picture as large as the view, and few layers."""
+    return {"layers": LAYERS[network.name][:count], "style_scale": 1.0}
 
 
 def generator() -> torch.Generator:
@@ -89,27 +98,29 @@ def test_the_painting_itself_is_nearer_than_others(
         assert values["itself"].total < 0.5 * values[name].total, name
 
 
-def test_grey_painting_differs_in_colour_only(vgg: VGG16, painting: FloatArray) -> None:
+def test_grey_painting_differs_in_colour_only(
+    network: FeatureNetwork, painting: FloatArray
+) -> None:
     grey = (reduced(painting) * torch.tensor([0.299, 0.587, 0.114]).view(1, 3, 1, 1)).sum(1)
     picture = grey[:, None].expand(-1, 3, -1, -1)
     in_colour = AppearanceLoss(
-        vgg, painting, AppearanceConfig(layers=LAYERS, grey=False, pixels=0.0), SIZE
+        network, painting, AppearanceConfig(**few(network), grey=False, pixels=0.0), SIZE
     )
     in_grey = AppearanceLoss(
-        vgg, painting, AppearanceConfig(layers=LAYERS, colour=False, pixels=0.0), SIZE
+        network, painting, AppearanceConfig(**few(network), colour=False, pixels=0.0), SIZE
     )
-    both = AppearanceLoss(vgg, painting, AppearanceConfig(layers=LAYERS, pixels=0.0), SIZE)
+    both = AppearanceLoss(network, painting, AppearanceConfig(**few(network), pixels=0.0), SIZE)
     assert measured(in_grey, picture).total < 0.5 * measured(in_colour, picture).total
     moments = [measured(one, picture).terms["moments"] for one in (in_colour, in_grey, both)]
     torch.testing.assert_close(moments[0] + moments[1], moments[2], rtol=1e-3, atol=1e-4)
 
 
-def test_terms_add_up_and_weights_apply(vgg: VGG16, painting: FloatArray) -> None:
-    ones = AppearanceConfig(layers=LAYERS, style=1.0, moments=1.0, pixels=1.0)
-    plain = measured(AppearanceLoss(vgg, painting, ones, SIZE), noise())
+def test_terms_add_up_and_weights_apply(network: FeatureNetwork, painting: FloatArray) -> None:
+    ones = AppearanceConfig(**few(network), style=1.0, moments=1.0, pixels=1.0)
+    plain = measured(AppearanceLoss(network, painting, ones, SIZE), noise())
     assert plain.total.item() == pytest.approx(sum(t.item() for t in plain.terms.values()))
-    config = AppearanceConfig(layers=LAYERS, style=2.0, moments=0.0, pixels=3.0)
-    weighted = measured(AppearanceLoss(vgg, painting, config, SIZE), noise())
+    config = AppearanceConfig(**few(network), style=2.0, moments=0.0, pixels=3.0)
+    weighted = measured(AppearanceLoss(network, painting, config, SIZE), noise())
     assert weighted.terms["moments"] == 0
     assert weighted.terms["pixels"].item() == pytest.approx(
         3 * plain.terms["pixels"].item(), rel=0.1
@@ -148,9 +159,11 @@ def test_an_empty_view_in_a_batch_changes_nothing_for_the_other(loss: Appearance
     torch.testing.assert_close(with_empty, alone / 2, rtol=1e-3, atol=1e-4)
 
 
-def test_pixels_without_smoke_have_no_say_in_the_palette(vgg: VGG16, painting: FloatArray) -> None:
-    config = AppearanceConfig(layers=LAYERS, style=0.0, moments=0.0, pixels=1.0)
-    loss = AppearanceLoss(vgg, painting, config, SIZE)
+def test_pixels_without_smoke_have_no_say_in_the_palette(
+    network: FeatureNetwork, painting: FloatArray
+) -> None:
+    config = AppearanceConfig(**few(network), style=0.0, moments=0.0, pixels=1.0)
+    loss = AppearanceLoss(network, painting, config, SIZE)
     picture = noise().requires_grad_()
     opacity = torch.zeros(1, SIZE, SIZE)
     opacity[:, 10:40, 20:40] = 0.9
@@ -161,10 +174,10 @@ def test_pixels_without_smoke_have_no_say_in_the_palette(vgg: VGG16, painting: F
     assert not touched[opacity == 0].any()
 
 
-def test_far_background_has_no_say_in_shallow_layers(vgg: VGG16, painting: FloatArray) -> None:
-    loss = AppearanceLoss(
-        vgg, painting, AppearanceConfig(layers=("relu1_1", "relu2_1"), pixels=0.0), SIZE
-    )
+def test_far_background_has_no_say_in_shallow_layers(
+    network: FeatureNetwork, painting: FloatArray
+) -> None:
+    loss = AppearanceLoss(network, painting, AppearanceConfig(**few(network, 2), pixels=0.0), SIZE)
     picture = noise().requires_grad_()
     opacity = torch.zeros(1, SIZE, SIZE)
     opacity[:, 16:32, 16:32] = 1
@@ -178,10 +191,10 @@ def test_far_background_has_no_say_in_shallow_layers(vgg: VGG16, painting: Float
 @pytest.mark.parametrize("opacity", [0.02, 0.3, 1.0])
 @pytest.mark.parametrize("patch", [1, 30])
 def test_little_or_thin_smoke_gives_finite_gradients(
-    vgg: VGG16, painting: FloatArray, opacity: float, patch: int
+    network: FeatureNetwork, painting: FloatArray, opacity: float, patch: int
 ) -> None:
-    config = AppearanceConfig(layers=("relu1_1", "relu2_1"))
-    loss = AppearanceLoss(vgg, painting, config, SIZE)
+    config = AppearanceConfig(**few(network, 2))
+    loss = AppearanceLoss(network, painting, config, SIZE)
     background = loss.background.clamp(0, 1).sqrt().view(1, 3, 1, 1)
     picture = background.expand(1, 3, SIZE, SIZE).clone().requires_grad_()
     alpha = torch.zeros(1, SIZE, SIZE)
@@ -208,29 +221,59 @@ def test_descent_approaches_the_painting(loss: AppearanceLoss) -> None:
     assert values[-1] < 0.8 * values[0]
 
 
-def test_smaller_strokes_can_be_asked_for(vgg: VGG16, painting: FloatArray) -> None:
+def test_smaller_strokes_can_be_asked_for(network: FeatureNetwork, painting: FloatArray) -> None:
     """With half the scale, the painting at half the size fits best."""
-    config = AppearanceConfig(layers=LAYERS, style_scale=0.5, pixels=0.0, style=0.0)
-    halved = AppearanceLoss(vgg, painting, config, 2 * SIZE)
+    config = AppearanceConfig(layers=LAYERS[network.name], style_scale=0.5, pixels=0.0, style=0.0)
+    halved = AppearanceLoss(network, painting, config, 2 * SIZE)
     small, large = reduced(painting, SIZE), reduced(painting, 2 * SIZE)
     assert measured(halved, small).total < measured(halved, large).total
+
+
+def test_the_scale_follows_the_strokes_unless_it_is_given(network: FeatureNetwork) -> None:
+    """Stripes of 4 pixels span three cells of two pixels each."""
+    bright = np.arange(96) // 4 % 2 == 0
+    stripes = np.broadcast_to(np.where(bright, 0.8, 0.1)[:, None, None], (96, 96, 3))
+    config = AppearanceConfig(layers=LAYERS[network.name])
+    loss = AppearanceLoss(network, stripes.astype(np.float32), config, SIZE, cells=SIZE / 2)
+    assert 4 * loss.style_scale * SIZE / 96 == pytest.approx(3 * 2, rel=0.1)
+    given = AppearanceConfig(layers=LAYERS[network.name], style_scale=1.25)
+    assert AppearanceLoss(network, stripes.astype(np.float32), given, SIZE).style_scale == 1.25
+
+
+def test_a_network_compares_the_layers_of_its_choice(
+    network: FeatureNetwork, painting: FloatArray
+) -> None:
+    own = AppearanceConfig(style_scale=1.0)
+    named = AppearanceConfig(style_scale=1.0, layers=network.style_layers)
+    assert (
+        measured(AppearanceLoss(network, painting, own, SIZE), noise()).total
+        == measured(AppearanceLoss(network, painting, named, SIZE), noise()).total
+    )
+
+
+def test_a_layer_of_another_network_is_named(network: FeatureNetwork, painting: FloatArray) -> None:
+    config = AppearanceConfig(layers=("relu9_9",), style_scale=1.0)
+    with pytest.raises(OptionError, match=rf"'relu9_9'.*'{network.name}'.*--appearance.layers"):
+        AppearanceLoss(network, painting, config, SIZE)
 
 
 def test_background_is_the_mean_colour(loss: AppearanceLoss, painting: FloatArray) -> None:
     np.testing.assert_allclose(loss.background, painting.mean((0, 1)), rtol=1e-3)
 
 
-def test_tiny_style_images_are_enlarged(vgg: VGG16) -> None:
+def test_tiny_style_images_are_enlarged(network: FeatureNetwork) -> None:
     tiny = np.random.default_rng(0).random((5, 9, 3), np.float32)
-    result = measured(AppearanceLoss(vgg, tiny, AppearanceConfig(layers=LAYERS), SIZE), noise())
+    result = measured(
+        AppearanceLoss(network, tiny, AppearanceConfig(**few(network)), SIZE), noise()
+    )
     assert torch.isfinite(result.total)
 
 
-def test_black_style_image_gives_finite_gradients(vgg: VGG16) -> None:
+def test_black_style_image_gives_finite_gradients(network: FeatureNetwork) -> None:
     black = np.zeros((40, 40, 3), np.float32)
     picture = torch.zeros(1, 3, SIZE, SIZE, requires_grad=True)
     measured(
-        AppearanceLoss(vgg, black, AppearanceConfig(layers=LAYERS), SIZE), picture
+        AppearanceLoss(network, black, AppearanceConfig(**few(network)), SIZE), picture
     ).total.backward()
     assert picture.grad is not None
     assert torch.isfinite(picture.grad).all()
@@ -243,9 +286,9 @@ def test_black_style_image_gives_finite_gradients(vgg: VGG16) -> None:
         ("moments", -1.0),
         ("pixels", -1.0),
         ("samples", 0),
-        ("layers", ()),
         ("opacity_threshold", 1.0),
         ("style_scale", 0.0),
+        ("style_scale", float("inf")),
     ],
 )
 def test_impossible_options_are_named(option: str, value: object) -> None:
@@ -259,8 +302,37 @@ def test_nothing_to_compare_is_refused() -> None:
 
 
 @pytest.mark.usefixtures("unchecked_shapes")
-def test_misshapen_input_is_refused(vgg: VGG16, loss: AppearanceLoss) -> None:
+def test_misshapen_input_is_refused(network: FeatureNetwork, loss: AppearanceLoss) -> None:
     with pytest.raises(ShapeError, match="style image"):
-        AppearanceLoss(vgg, np.zeros((40, 40), np.float32), AppearanceConfig(layers=LAYERS), SIZE)
+        AppearanceLoss(
+            network, np.zeros((40, 40), np.float32), AppearanceConfig(**few(network)), SIZE
+        )
     with pytest.raises(ShapeError, match="opacity"):
         loss(noise(), torch.ones(1, SIZE, SIZE + 1), generator())
+
+
+@pytest.mark.usefixtures("unchecked_shapes")
+def test_what_is_compared_in_grey_may_be_a_picture_of_its_own(
+    network: FeatureNetwork, painting: FloatArray, loss: AppearanceLoss
+) -> None:
+    picture, opaque = noise(), torch.ones(1, SIZE, SIZE)
+    luma = luminance(picture)
+    assert loss(picture, opaque, generator(), luma).total == measured(loss, picture).total
+    # Only what is in grey is another, and only that has a gradient.
+    other = luminance(noise(5)).requires_grad_()
+    config = AppearanceConfig(**{**few(network), "colour": False, "pixels": 0.0})
+    grey_alone = AppearanceLoss(network, painting, config, SIZE)
+    total = grey_alone(picture, opaque, generator(), other).total
+    assert total == measured(grey_alone, noise(5)).total
+    total.backward()
+    assert other.grad is not None
+    assert other.grad.abs().sum() > 0
+    with pytest.raises(ShapeError, match="grey"):
+        loss(picture, opaque, generator(), luma[..., 1:])
+
+
+def test_a_density_in_grey_that_nothing_looks_at_is_refused() -> None:
+    assert AppearanceConfig(grey_source="density").shows_density
+    assert not AppearanceConfig().shows_density
+    with pytest.raises(OptionError, match=r"--appearance\.grey-source"):
+        AppearanceConfig(grey=False, grey_source="density")

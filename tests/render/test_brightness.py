@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+import torch
 
-from vnca.render.brightness import gamma_for_cell_opacity
+from vnca.render.brightness import gamma_for_cell_opacity, gamma_for_own_colour
+from vnca.render.paper import paper_composite
 
 
 @pytest.mark.parametrize("opacity", [0.15, 0.95])
@@ -22,3 +24,16 @@ def test_faint_fringes_and_units_do_not_change_the_picture() -> None:
 
 def test_without_smoke_any_gamma_will_do() -> None:
     assert gamma_for_cell_opacity(np.zeros((2, 0, 3), np.float32), 0.9) == 1
+    assert gamma_for_own_colour(np.zeros((2, 0, 3), np.float32)) == 1
+
+
+@pytest.mark.parametrize("density", [0.2, 1.0, 3.0])
+def test_by_the_papers_integrand_even_smoke_is_as_bright_as_its_colour(density: float) -> None:
+    gamma = gamma_for_own_colour(np.full((4, 5), density))
+    ray, colour = torch.full((1, 200), density), torch.full((1, 200, 3), 0.6)
+    seen, opacity = paper_composite(ray, colour, gamma=gamma)
+    assert seen[0].tolist() == pytest.approx([0.6] * 3, rel=1e-4)
+    assert opacity.item() == pytest.approx(1)
+    # What suits emission and absorption is nearly black here.
+    dark, _ = paper_composite(ray, colour, gamma=gamma_for_cell_opacity(ray.numpy(), 0.95))
+    assert dark.max() < 0.25 * density

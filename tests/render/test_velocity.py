@@ -75,6 +75,24 @@ def test_smoke_in_front_hides_what_moves_behind_it() -> None:
     assert abs(through) < 0.01  # thin smoke: both alike
 
 
+def test_cells_of_any_shape_move_as_far_as_they_do_in_the_world() -> None:
+    place = np.eye(4)
+    place[:3] = [[-0.2, 0.1, 0, 4], [0, 0.1, 0, -3], [0, 0.05, 0.4, 2]]
+    corners = np.stack(np.meshgrid(*[(-0.5, 19.5)] * 3), -1).reshape(-1, 3)
+    corners = corners @ place[:3, :3].T + place[:3, 3]
+    view = frame_box(corners.min(0).tolist(), corners.max(0).tolist(), 20, 10)
+    assert isinstance(view, Orthographic)
+    velocity = (0.5, 0.3, -0.4)
+    flow, _ = seen(
+        torch.ones(SHAPE), everywhere(*velocity), view, gamma=9.0, step=0.1, cells_to_world=place
+    )
+    middle = np.array(view.target)
+    ends = np.stack([middle, middle + place[:3, :3] @ velocity])
+    row, column, _ = view.project(ends, 40, 40)
+    expected = torch.tensor([column[1] - column[0], row[1] - row[0]]).float()
+    torch.testing.assert_close(flow[20, 20], expected, atol=1e-3, rtol=1e-3)
+
+
 def solid_texture(shift: torch.Tensor) -> torch.Tensor:
     """A smooth solid texture at the cell centres, moved by `shift` cells."""
     axes = (torch.arange(float(n)) for n in SHAPE)

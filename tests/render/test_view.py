@@ -1,6 +1,7 @@
 import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 import torch
 
@@ -37,6 +38,83 @@ def test_slab_has_the_analytic_opacity_from_every_side(step, offset, angles) -> 
     )
     # Interpolation fades linearly over a cell at either end, so the smoke is 6 cells thick.
     assert view.opacity.item() == pytest.approx(1 - math.exp(-0.4 * 0.5 * 6), rel=1e-5)
+
+
+def placed(*columns: tuple[float, float, float], at=(0.0, 0.0, 0.0)) -> np.ndarray:
+    """The 4×4 that takes the axes of the cells to these vectors and cell (0, 0, 0) to `at`."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = np.transpose(columns), at
+    return matrix
+
+
+PLACES = {
+    "uneven": placed((0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.4)),
+    "mirrored": placed((-0.2, 0, 0), (0, 0.2, 0), (0, 0, 0.2), at=(3, -1, 7)),
+    "turned": placed((0, 0, 0.3), (0.3, 0, 0), (0, 0.3, 0), at=(0, 4, 0)),
+    "far away": placed((0.05, 0, 0), (0, 0.05, 0), (0, 0, 0.05), at=(1e5, -2e5, 3e4)),
+    "sheared": placed((1, 0, 0), (0.7, 1, 0), (0.2, -0.4, 0.5), at=(1, 2, 3)),
+}
+
+
+@pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
+@pytest.mark.parametrize("angles", [(0, 0), (90, 0), ABOVE, (35, 20)])
+def test_what_a_slab_absorbs_depends_on_its_thickness_in_the_world(place, angles) -> None:
+    ray = np.linalg.inv(place[:3, :3]) @ Orthographic((0, 0, 0), *angles).rays(1, 1)[1][0, 0]
+    shape = [21, 21, 21]
+    shape[np.abs(ray).argmax()] = 4  # the ray goes through this side of it, far from the others
+    thickness = 4 / np.abs(ray).max()
+    middle = place @ [*((n - 1) / 2 for n in shape), 1]
+    camera = Orthographic(tuple(middle[:3].tolist()), *angles, height=1e-3 * thickness)
+    density = torch.full(shape, 0.5, dtype=torch.float64)
+    options = {"rows": 1, "columns": 1, "step": thickness / 400, "cells_to_world": place}
+    view = render(density, white(density), camera, gamma=2.2 / thickness, **options)
+    assert view.opacity.item() == pytest.approx(1 - math.exp(-0.5 * 2.2), rel=1e-3)
+
+
+@pytest.mark.parametrize("field_of_view", [None, 35.0])
+@pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
+def test_a_marked_cell_appears_where_it_is_in_the_world(place, field_of_view) -> None:
+    shape, cell = (12, 14, 16), (2, 3, 13)
+    density = torch.zeros(shape)
+    density[cell] = 1
+    corners = np.stack(np.meshgrid(*[(-0.5, n - 0.5) for n in shape]), -1).reshape(-1, 3)
+    corners = corners @ place[:3, :3].T + place[:3, 3]
+    camera = frame_box(
+        corners.min(0).tolist(), corners.max(0).tolist(), 35, 20, field_of_view=field_of_view
+    )
+    edge = np.cbrt(abs(np.linalg.det(place)))
+    options = {"gamma": 1 / edge, "step": 0.1 * edge, "cells_to_world": place}
+    view = render(density, white(density), camera, rows=96, columns=96, **options)
+    rows, columns = torch.meshgrid(torch.arange(96.0), torch.arange(96.0), indexing="ij")
+    total = view.opacity.sum()
+    row, column, depth = camera.project((place @ (*cell, 1))[:3], 96, 96)
+    assert (rows * view.opacity).sum() / total == pytest.approx(row, abs=0.3)
+    assert (columns * view.opacity).sum() / total == pytest.approx(column, abs=0.3)
+    mean_depth = (view.depth.where(view.opacity > 0, 0) * view.opacity).sum() / total
+    assert mean_depth == pytest.approx(depth, abs=0.2 * edge)
+
+
+@pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
+def test_smoke_looks_the_same_on_whatever_cells_it_is_given(place) -> None:
+    """A soft ball of the world, on the cells of a place and on cubic ones."""
+    radius = 5 * np.linalg.norm(place[:3, :3], axis=0).max()
+    middle = place[:3, 3]
+    camera = Orthographic(tuple(middle.tolist()), 35, 20, height=2 * radius)
+    views = []
+    for linear in (place[:3, :3], radius / 20 * np.eye(3)):
+        reach = np.ceil(radius * np.linalg.norm(np.linalg.inv(linear), axis=1)) + 1
+        axes = (np.arange(-n, n + 1) for n in reach)
+        index = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+        at = index @ linear.T / radius
+        density = torch.from_numpy(np.maximum(1 - np.square(at).sum(-1), 0) ** 2)
+        colour = torch.from_numpy(0.5 + 0.5 * np.sin(2 * at))
+        there = np.eye(4)
+        there[:3, :3], there[:3, 3] = linear, middle - linear @ reach
+        options = {"gamma": 3 / radius, "step": 0.03 * radius, "cells_to_world": there}
+        views.append(render(density, colour, camera, rows=24, columns=24, **options).rgba)
+    assert views[1][..., 3].max() > 0.9
+    torch.testing.assert_close(*views, rtol=0, atol=0.06)
+    assert (views[0] - views[1]).square().mean().sqrt() < 0.02
 
 
 @pytest.mark.parametrize("field_of_view", [None, 35.0])

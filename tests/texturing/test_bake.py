@@ -42,10 +42,10 @@ def test_the_texture_shows_the_solid_everywhere_and_on_both_sides_of_seams(
     ball: Mesh, block: FloatArray
 ) -> None:
     """Read as a viewer reads it, bilinearly, also right at the border of a chart."""
-    made, texels = unwrapped(ball, "auto", size=512)
+    atlas = unwrapped(ball, "auto", size=512)
     place = Placement.of(ball, size=16, scale=1)
-    picture = bake(block, texels, place)
-    (surface,), (unwrapping,) = ball.surfaces, made
+    picture = bake(block, atlas.texels, place)
+    (surface,), (unwrapping,) = ball.surfaces, atlas.unwrappings
     random = np.random.default_rng(0)
     inside = random.dirichlet((1, 1, 1), len(surface.faces))
     on_edge = np.insert(random.dirichlet((1, 1), len(surface.faces)), 1, 0, axis=1)

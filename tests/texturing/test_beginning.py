@@ -13,7 +13,7 @@ def test_the_texture_is_of_the_rule_and_the_picture_that_smoke_is_trained_with()
     config = replace(
         PRESETS["draft"], iterations=50, seed=3, appearance=AppearanceConfig(style_scale=0.75)
     )
-    texture = beginning_config(config, 2.5, cells=80)
+    texture = beginning_config(config, 2.5, picture=60)
     assert texture is not None
     assert texture.iterations == 125
     assert texture.seed == 3
@@ -23,13 +23,13 @@ def test_the_texture_is_of_the_rule_and_the_picture_that_smoke_is_trained_with()
 
 
 def test_the_patterns_of_a_large_picture_are_kept_within_the_block() -> None:
-    texture = beginning_config(PRESETS["standard"], 1, cells=1000)
+    texture = beginning_config(PRESETS["standard"], 1, picture=1000)
     assert texture is not None
     assert texture.appearance.style_scale * texture.slices.size == LARGEST_PICTURE
 
 
 def test_the_paper_begins_with_nothing() -> None:
-    assert beginning_config(PRESETS["paper"], SHARES["paper"], cells=64) is None
+    assert beginning_config(PRESETS["paper"], SHARES["paper"], picture=64) is None
 
 
 def test_a_rule_that_is_deaf_to_priors_is_otherwise_the_same() -> None:

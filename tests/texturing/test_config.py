@@ -4,6 +4,7 @@ import pytest
 
 from vnca.automaton.rule import RuleConfig
 from vnca.errors import OptionError
+from vnca.losses.appearance import AppearanceConfig
 from vnca.texturing.config import PRESETS, SliceConfig, TextureConfig
 from vnca.training.course import PoolConfig
 
@@ -31,6 +32,10 @@ def test_presets_tell_cells_nothing() -> None:
         (lambda: TextureConfig(overflow=-1), "--overflow"),
         (lambda: TextureConfig(seed=-1), "--seed"),
         (lambda: TextureConfig(block=4), "--block"),
+        (
+            lambda: TextureConfig(appearance=AppearanceConfig(grey_source="density")),
+            "--appearance.grey-source",
+        ),
     ],
 )
 def test_values_that_cannot_work_are_refused_by_name(

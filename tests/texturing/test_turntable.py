@@ -32,8 +32,8 @@ def test_the_baked_mesh_looks_like_the_solid_from_all_sides(ball: Path, block: F
     """Without seams: the texture and the solid itself give the same film."""
     mesh = read_mesh(ball)
     place = Placement.of(mesh, size=16, scale=1)
-    made, texels = unwrapped(mesh, "auto", size=256)
-    put_on(mesh, made, to_png(bake(block, texels, place)))
+    atlas = unwrapped(mesh, "auto", size=256)
+    put_on(mesh, atlas.unwrappings, to_png(bake(block, atlas.texels, place)))
     mesh.glb.write(ball.with_name("textured.glb"))
     baked = read_mesh(ball.with_name("textured.glb"))
     before, after = Turntable(mesh, FILM), Turntable(baked, FILM)

@@ -9,6 +9,7 @@ from vnca.errors import OptionError
 from vnca.training.config import PRESETS, TrainConfig, ViewConfig
 from vnca.training.course import PoolConfig
 from vnca.training.memory import (
+    SAMPLE_BYTES,
     is_out_of_memory,
     memory_advice,
     memory_budget,
@@ -58,6 +59,8 @@ def test_needs_follow_the_options(scene: SmokeScene) -> None:
     assert memory_needs(scene, larger).pool == 2 * needs.pool
     assert memory_needs(scene, larger).pictures == 4 * needs.pictures
     assert memory_needs(scene, larger).work == needs.work
+    both = replace(MANY, appearance=replace(MANY.appearance, grey=True))
+    assert 1.5 * needs.pictures < memory_needs(scene, both).pictures < 2 * needs.pictures
 
 
 def test_what_would_save_the_most_is_advised(scene: SmokeScene) -> None:
@@ -86,6 +89,13 @@ def test_budgets_are_sizes(text: str, bytes_: float | None) -> None:
 def test_what_is_no_size_is_refused(text: str) -> None:
     with pytest.raises(OptionError, match=f"--memory-budget {text}: expected auto"):
         memory_budget(text)
+
+
+def test_pictures_of_the_density_take_memory_too(scene: SmokeScene) -> None:
+    appearance = replace(MANY.appearance, grey=True, grey_source="density")
+    seen = memory_needs(scene, replace(MANY, appearance=appearance)).pictures
+    sampled = 32**2 * scene.samples * SAMPLE_BYTES["cpu"]
+    assert seen == pytest.approx(memory_needs(scene, MANY).pictures + sampled, abs=1)
 
 
 def test_all_states_are_kept_where_there_is_room(

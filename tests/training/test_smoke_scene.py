@@ -17,6 +17,7 @@ from vnca.training.smoke_scene import (
     SmokeScene,
     smoke_bounds,
     velocity_scale,
+    view_width,
 )
 from vnca.typing import Box
 from vnca.volume import Volume
@@ -111,6 +112,57 @@ def test_cells_live_near_the_smoke_or_in_its_whole_box(tiny_smoke: Volume) -> No
     torch.testing.assert_close(*seen)
 
 
+def lying(smoke: Volume, way: int) -> Volume:
+    """The same smoke of the world, with index axes exchanged and mirrored."""
+    order = [(2, 0, 1), (1, 0, 2)][way]
+    density = smoke.density.transpose(order)[:, ::-1]
+    assert smoke.velocity is not None
+    velocity = smoke.velocity.transpose(*order, 3)[:, ::-1][..., order] * np.array(
+        [1, -1, 1], np.float32
+    )
+    turn = np.eye(4)[:, (*order, 3)]
+    turn[:, 1] *= -1
+    matrix = smoke.index_to_world @ turn
+    matrix[:3, 3] -= matrix[:3, 1] * (density.shape[1] - 1)
+    return Volume(density.copy(), velocity.copy(), (0, 0, 0), matrix, smoke.frame)
+
+
+@pytest.mark.parametrize("way", [0, 1])
+@pytest.mark.parametrize("azimuth", [0, 50])
+def test_views_are_of_the_world_however_cells_are_counted(
+    tiny_smoke: Volume, way: int, azimuth: float
+) -> None:
+    """A mirrored, turned or uneven grid shows the same smoke in the same place."""
+    shape = (12, 14, 10)
+    density = np.zeros(shape, np.float32)
+    density[2:10, 3:12, 1:6], density[5:7, 5:9, 5:9] = 1, 1  # no symmetry
+    flat = Volume(density, np.full((*shape, 3), (0.5, 0.2, -0.3), np.float32), (0, 0, 0),
+                  tiny_smoke.index_to_world, 1)  # fmt: skip
+    one, other = scene(flat, gamma=2.0), scene(lying(flat, way), gamma=2.0)
+    views = [s.look(s.seed(4), s.camera(azimuth, 20)) for s in (one, other)]
+    assert float(views[0].opacity.mean()) > 0.2
+    torch.testing.assert_close(views[0].opacity, views[1].opacity, atol=1e-3, rtol=0)
+    sights = [s.sight(np.random.default_rng(1)) for s in (one, other)]
+    motions = [
+        s.motion(s.seed(4), sight, 32) for s, sight in zip((one, other), sights, strict=True)
+    ]
+    torch.testing.assert_close(motions[0][0], motions[1][0], atol=1e-3, rtol=1e-3)
+
+
+def test_smoke_on_uneven_cells_is_as_high_and_as_opaque_as_in_the_world(tiny_smoke: Volume) -> None:
+    flat = replace(tiny_smoke, density=np.ones((8, 8, 8), np.float32), velocity=None)
+    uneven = replace(flat, index_to_world=np.diag([0.1, 0.1, 0.4, 1.0]))
+    high = scene(uneven, gamma=0.2)
+    view = high.look(high.seed(4), high.camera(0, 0))
+    seen = view.opacity > 0.1
+    rows, columns = (int(seen.any(axis).sum()) for axis in (1, 0))
+    assert 3.5 < rows / columns < 4.5
+    # Eight cells of 0.1, where γ is per edge of a cube as large as a cell.
+    edge = np.cbrt(0.1 * 0.1 * 0.4)
+    assert float(view.opacity.max()) == pytest.approx(1 - np.exp(-0.2 * 0.8 / edge), rel=0.05)
+    assert view_width(uneven.box, uneven.index_to_world) > view_width(flat.box, flat.index_to_world)
+
+
 def angles(there: SmokeScene, count: int = 40) -> set[tuple[float, float]]:
     """Azimuths and elevations that training looks from."""
     random = np.random.default_rng(0)
@@ -179,6 +231,26 @@ def test_the_rule_is_told_the_wind_and_another_density_than_is_seen(tiny_smoke: 
     torch.testing.assert_close(dense, thin * (dense.max() / thin.max()))
     assert 1 / DENSEST <= dense.max() / thin.max() <= DENSEST
     assert torch.equal(blown._density, windy._density)
+
+
+def test_no_more_density_is_told_in_training_than_in_painting(tiny_smoke: Volume) -> None:
+    """What is denser than the limit is made denser or thinner before it is limited."""
+    steep = replace(tiny_smoke, density=tiny_smoke.density**4 * 6)
+    windy = in_winds(steep)
+    seen = windy._density
+    assert seen.max() > 5
+    for place in range(12):
+        told = windy.variant(place).priors[:, 3]
+        assert told.max() <= 4
+        thin = told < 4
+        factor = (told / seen)[thin & (seen > 0)]
+        torch.testing.assert_close(factor, factor[:1].expand_as(factor))
+        torch.testing.assert_close(told, (factor[0] * seen).clamp_max(4))
+    assert not in_winds(steep, without_density()).variant(3).priors[:, 3].any()
+
+
+def without_density() -> Rule:
+    return Rule.initial(replace(WINDY.config, density_prior=False), WINDY.scales, seed=0)
 
 
 def test_a_rule_that_is_told_no_velocity_is_told_no_wind(tiny_smoke: Volume) -> None:

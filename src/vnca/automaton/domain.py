@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -119,6 +120,27 @@ class Domain:
             wrapped = ((beside - lower) % (upper - lower) + lower).reshape(-1, 3)
             result[:, border] = self.rows.gather(wrapped).reshape(len(OFFSETS), -1)
         return result
+
+    def corners(self, points: AnyArray) -> tuple[IntArray, FloatArray]:
+        """Between which cells points lie, as decoding wants to know.
+
+        Args:
+            points: `[m, 3]` index coordinates, finite; cell `[i, j, k]` has its centre there.
+
+        Returns:
+            Rows `[8, m]` of the state around each point, z fastest, n where nothing lives; and
+            `[m, 3]` how far it lies from the first of these cells to the last, 0 to 1.
+        """
+        lower, upper = np.asarray(self.box.lower), np.asarray(self.box.upper)
+        first = np.floor(points)
+        fractions = (points - first).astype(np.float32)
+        cells = first + np.array(list(product((0, 1), repeat=3)))[:, None]
+        if self.border == "replicate":
+            cells = cells.clip(lower, upper - 1)
+        else:
+            cells = (cells - lower) % (upper - lower) + lower
+        rows = self.rows.gather(cells.astype(np.int32).reshape(-1, 3))
+        return rows.reshape(8, -1), fractions
 
     @cached_property
     def places(self) -> AnyArray:

@@ -12,19 +12,23 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 import vnca
+from vnca.automaton.decoder import Decoder
 from vnca.automaton.rule import Rule, RuleConfig, Scales
 from vnca.errors import ModelError, OptionError, ShapeError
 from vnca.files import existing_file, whole_file
+from vnca.kernels.decode.weights import Weights
 from vnca.lattice import Lattice, Region
 from vnca.typing import Box, FloatArray
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""The newest that is read; a model is written in the oldest that holds it, 2 with a decoder."""
 MODEL_NAME = "model.safetensors"
 """Name of the model in a run folder."""
 
 _METADATA = "vnca"
 _WEIGHTS = ("hidden", "bias", "output")
 _STYLE = "style"
+_DECODER = tuple(f"decoder.{name}" for name in Weights._fields)
 _FARTHEST = 1e30  # in the world, or of a cell's size
 _EXACT = 2**53  # whole numbers up to here are floats
 
@@ -53,9 +57,11 @@ class Model:
         Raises:
             OutputError: If it cannot be written.
         """
+        decoder = self.rule.decoder
+        weights = {name: getattr(self.rule, name) for name in _WEIGHTS}
+        weights |= dict(zip(_DECODER, decoder.weights, strict=True)) if decoder else {}
         tensors: dict[str, NDArray[Any]] = {
-            name: np.ascontiguousarray(getattr(self.rule, name), dtype=np.float32)
-            for name in _WEIGHTS
+            name: np.ascontiguousarray(array, dtype=np.float32) for name, array in weights.items()
         }
         if self.style is not None:
             tensors[_STYLE] = np.ascontiguousarray(self.style)
@@ -63,7 +69,7 @@ class Model:
         metadata = {
             _METADATA: json.dumps(
                 {
-                    "format_version": FORMAT_VERSION,
+                    "format_version": 1 if decoder is None else 2,
                     "version": self.version,
                     "rule": dataclasses.asdict(self.rule.config),
                     "scales": dataclasses.asdict(self.rule.scales),
@@ -93,7 +99,8 @@ class Model:
         try:
             with safe_open(path, framework="numpy") as file:
                 metadata = file.metadata() or {}
-                known = [name for name in file.keys() if name in (*_WEIGHTS, _STYLE)]  # noqa: SIM118
+                expected = {*_WEIGHTS, *_DECODER, _STYLE}
+                known = [name for name in file.keys() if name in expected]  # noqa: SIM118
                 tensors = {name: file.get_tensor(name) for name in known}
         # Types that numpy lacks raise the last two.
         except (SafetensorError, OSError, ValueError, TypeError, AttributeError) as error:
@@ -108,6 +115,7 @@ class Model:
                 config=from_record(RuleConfig, described["rule"]),
                 scales=from_record(Scales, described["scales"]),
                 place=_place(described.get("place")),
+                decoder=_decoder(tensors),
             )
             training, version = dict(described["training"]), str(described["version"])
         except (KeyError, TypeError, ValueError, RecursionError, OptionError) as error:
@@ -118,6 +126,17 @@ class Model:
         if style is not None and (style.dtype != np.uint8 or style.shape[2:] != (3,)):
             raise ModelError(f"{path}: the style thumbnail is not an 8-bit picture")
         return cls(rule, training, style, version)
+
+
+def _decoder(tensors: dict[str, NDArray[Any]]) -> Decoder | None:
+    """All of a decoder, or none.
+
+    Raises:
+        KeyError: If there is only a part of one.
+    """
+    if tensors.keys().isdisjoint(_DECODER):
+        return None
+    return Decoder(Weights(*(_single_precision(name, tensors[name]) for name in _DECODER)))
 
 
 def _described(place: Region | None) -> dict[str, Any]:

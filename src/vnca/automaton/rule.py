@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from vnca.automaton.decoder import Decoder
 from vnca.automaton.domain import DomainKind
 from vnca.errors import OptionError, ShapeError
 from vnca.kernels.update.stencil import FILTERS
@@ -87,6 +88,10 @@ class Scales:
             if not 0 < getattr(self, name) < math.inf:
                 raise OptionError(f"scale '{name}' {getattr(self, name)}: must be positive")
 
+    def extinction(self, cell_length: float) -> float:
+        """Of density 1 in a file, per length of its world, where cells are so long."""
+        return self.gamma / (self.density * cell_length)
+
 
 def density_scale(density: FloatArray) -> float:
     """The density that counts as 1: the 99th percentile of what is not empty."""
@@ -106,6 +111,7 @@ class Rule:
         scales: Its normalisers.
         place: Where it was trained, in which cells have a position. Without it, that is the box of
             the domain.
+        decoder: What lets its states be seen between cells; without one they are interpolated.
     """
 
     hidden: FloatArray
@@ -114,6 +120,7 @@ class Rule:
     config: RuleConfig = field(default_factory=RuleConfig)
     scales: Scales = field(default_factory=Scales)
     place: Region | None = None
+    decoder: Decoder | None = None
 
     def __post_init__(self) -> None:
         expected = {
@@ -127,6 +134,11 @@ class Rule:
                 raise ShapeError(f"weights '{name}': expected shape {shape}, got {weights.shape}")
             if not np.isfinite(weights).all():
                 raise ShapeError(f"weights '{name}': not all finite")
+        if self.decoder is not None and self.decoder.channels != self.config.channels:
+            raise ShapeError(
+                f"decoder weights 'first': expected {self.config.channels} channels as the rule "
+                f"has, got {self.decoder.channels}"
+            )
 
     @classmethod
     def initial(cls, config: RuleConfig, scales: Scales, *, seed: int) -> "Rule":
@@ -157,5 +169,6 @@ class Rule:
 
     @property
     def weight_count(self) -> int:
-        """Number of trained weights."""
-        return self.hidden.size + self.bias.size + self.output.size
+        """Number of trained weights, those of the decoder included."""
+        own = self.hidden.size + self.bias.size + self.output.size
+        return own + (self.decoder.weight_count if self.decoder else 0)

@@ -17,7 +17,7 @@ from vnca.bench.agreement import Difference, require_agreement
 from vnca.bench.memory import peak_mb
 from vnca.bench.plain import PlainUpdate
 from vnca.bench.timing import Spread
-from vnca.features.vgg import VGG16
+from vnca.features.network import FeatureNetwork
 from vnca.training.config import TrainConfig
 from vnca.training.loop import Trainer
 from vnca.training.smoke import smoke_trainer
@@ -42,7 +42,7 @@ class Training:
         smoke: The frame.
         style: Linear RGB `[r, c, 3]`.
         config: The hyperparameters.
-        vgg: The frozen network.
+        network: The frozen network.
         device: Where to compute.
         memory_budget: Bytes that the program may take, as a trainer has it.
     """
@@ -50,7 +50,7 @@ class Training:
     smoke: Volume
     style: FloatArray
     config: TrainConfig
-    vgg: VGG16
+    network: FeatureNetwork
     device: torch.device
     memory_budget: int | None = None
 
@@ -69,7 +69,7 @@ class Training:
             self.smoke,
             self.style,
             config,
-            self.vgg,
+            self.network,
             device=self.device,
             memory_budget=self.memory_budget,
         )

@@ -18,8 +18,8 @@ from vnca.cli.options import say
 from vnca.cli.sequence import beside, read_alone
 from vnca.cli.session import choose_device
 from vnca.errors import OptionError
-from vnca.features.vgg import VGG16
-from vnca.io.image import read_image
+from vnca.features.load import load_network
+from vnca.io.image import read_style
 from vnca.io.smoke import SmokeFormat
 from vnca.kernels.update.native import default_threads
 from vnca.simulate.scenes import simulate
@@ -105,9 +105,9 @@ def bench_train(options: BenchTrain) -> None:
         require(name, "float32", device.type)
     torch.set_num_threads(options.threads)
     facts = run_facts(device.type, options.threads)
-    vgg = VGG16.load(config.features, device)
+    network = load_network(config.features, device)
     budget = memory_budget(options.memory_budget)
-    training = Training(_smoke(options), _style(options), config, vgg, device, budget)
+    training = Training(_smoke(options), _style(options), config, network, device, budget)
     rows = measure_training(
         training,
         options.backends or available("float32", device.type),
@@ -129,7 +129,7 @@ def _smoke(options: BenchTrain) -> Volume:
 
 def _style(options: BenchTrain) -> FloatArray:
     with as_file(files("vnca.data") / STYLE) as own:
-        return read_image(options.style or own)
+        return read_style(options.style or own)
 
 
 def _table(rows: Rows) -> list[str]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from vnca.automaton.model import Model
 from vnca.cli.film import FilmConfig
 from vnca.cli.options import parse, say
 from vnca.cli.render import Render, strip
@@ -14,7 +13,7 @@ from vnca.cli.sequence import open_sequence
 from vnca.cli.simulate import Simulate, write_simulation
 from vnca.cli.stylize import Stylize, paint
 from vnca.cli.train import Train, train
-from vnca.io.image import fit, read_image, write_image
+from vnca.io.image import fit, read_style, write_image
 from vnca.io.sheet import contact_sheet
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.typing import FloatArray
@@ -57,7 +56,7 @@ def demonstrate(options: Demo) -> None:
     film, sheet = options.out / "demo.mp4", options.out / "demo.png"
     with as_file(files("vnca.data") / STYLE) as own:
         style = options.style or own
-        picture = read_image(style)
+        picture = read_style(style)
         write_simulation(Simulate("plume", smoke, resolution, frames, options.seed))
         trained = smoke / f"plume_{3 * frames // 4:04d}.vdb"
         train(
@@ -74,10 +73,8 @@ def demonstrate(options: Demo) -> None:
         asked = f"{frames // 4}-{frames}"
         refine = 1 if options.quick else 2
         paint(Stylize(run_folder, sequence, painted, frames=asked, preview=film, refine=refine))
-        scales = Model.load(run_folder).rule.refined(refine).scales
-        gamma = scales.gamma / scales.density
         view = FilmConfig(rows=SHEET_SIZE, columns=SHEET_SIZE)
-        shown = Render(str(painted), sheet, frames=asked, gamma=gamma, film=view)
+        shown = Render(str(painted), sheet, frames=asked, film=view)
         write_image(sheet, _sheet(picture, shown))
     minutes, seconds = divmod(round(time.monotonic() - start), 60)
     say(f"done in {minutes}:{seconds:02}")

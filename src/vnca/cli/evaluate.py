@@ -18,12 +18,14 @@ from vnca.cli.options import is_given, parse, say
 from vnca.cli.progress import tracked
 from vnca.cli.recorded import PICTURE_CELLS, recorded_smoke
 from vnca.cli.sequence import open_sequence, placed, sequence_region, volumes
-from vnca.errors import OptionError
+from vnca.errors import BackendUnavailableError, OptionError
+from vnca.evaluation.judges import Judge
 from vnca.evaluation.measures import Measure, measures
 from vnca.evaluation.report import report
 from vnca.evaluation.stage import SIZE, Stage
 from vnca.evaluation.style import SMALLEST, StyleGauge
 from vnca.evaluation.survey import survey
+from vnca.features.load import load_network
 from vnca.files import whole_file, writable_folder
 from vnca.io.image import read_image
 from vnca.io.sequence import format_frames
@@ -38,6 +40,8 @@ REPORT_NAME = "report.html"
 MEASURES_NAME = "report.json"
 LARGEST = 4096
 """Pixels along the shorter side of the picture."""
+JUDGES = ("edges", "efficientnet")
+"""Networks that compare the painting with the picture, whichever the rule was trained with."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,8 @@ def evaluate(options: Evaluate, model: Model) -> None:
         refine=refine,
     )
     tracking = tracked(paintings, "painting and measuring", len(sequence), "frames")
-    found = survey(tracking, len(sequence), rule.refined(refine), stage, gauge)
+    judges = _judges(model, gauge, options.size)
+    found = survey(tracking, len(sequence), rule.refined(refine), stage, gauge, judges)
     facts = {
         "title": f"{folder.resolve().name} on {sequence[0].path.resolve().parent.name}",
         "picture": str(model.training.get("style", options.style)),
@@ -144,8 +149,24 @@ def evaluate(options: Evaluate, model: Model) -> None:
     with whole_file(out / MEASURES_NAME) as temporary:
         described = {measure.name: measure.as_json() for measure in listed}
         temporary.write_text(json.dumps(described, indent=2) + "\n")
+    say(f"trained with features '{model.training.get('features', 'unknown')}'")
     _print(listed)
     say(f"report: {out / REPORT_NAME}")
+
+
+def _judges(model: Model, gauge: StyleGauge, size: int) -> list[Judge]:
+    """The networks, each with whether the rule was trained with it; those not installed say so."""
+    found = []
+    for name in JUDGES:
+        origin = model.training.get("features_origin")
+        try:
+            network = load_network(name)
+        except BackendUnavailableError as error:
+            found.append(Judge(name, model.training.get("features") == name, str(error)))
+            continue
+        trained_with = None if origin is None else origin == network.origin
+        found.append(Judge.of(network, trained_with, gauge, size))
+    return found
 
 
 def _print(listed: Sequence[Measure]) -> None:

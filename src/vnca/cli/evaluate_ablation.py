@@ -5,16 +5,18 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import tyro
 
+import vnca
 from vnca.automaton.model import MODEL_NAME, Model
 from vnca.automaton.rule import Rule
 from vnca.cli.options import chosen, parse, say
 from vnca.cli.sequence import beside, read_alone
-from vnca.cli.train import Train, train
+from vnca.cli.session import FINGERPRINTS, choose_device
+from vnca.cli.train import Train, train, training_inputs
 from vnca.errors import OptionError
 from vnca.evaluation.estimators import Estimator, estimators
 from vnca.evaluation.motion import (
@@ -23,9 +25,13 @@ from vnca.evaluation.motion import (
     measure_drift,
     measure_motion,
 )
+from vnca.features.vgg import VGG16
 from vnca.files import existing_file, whole_file, writable_file
+from vnca.io.image import read_image
 from vnca.io.smoke import SmokeFormat
+from vnca.training.checkpoint import CHECKPOINT_NAME
 from vnca.training.config import PRESETS, TrainConfig
+from vnca.training.run import CONFIG_NAME
 from vnca.volume import Volume
 
 
@@ -36,11 +42,12 @@ class Ablation:
     frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
     """A frame of smoke with velocity."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
-    """The picture: PNG, JPEG or WebP."""
+    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
     ablation: Literal["velocity"]
     """What is taken away."""
     out: Path
-    """Folder for a run of each kind; runs that are there already are not trained again."""
+    """Folder for a run of each kind; runs that are there already are not trained again, and runs
+    of another frame, picture or options are refused."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """A run of each kind for each seed."""
     preset: Literal["draft", "standard", "paper"] = "draft"
@@ -73,6 +80,7 @@ def run(arguments: Sequence[str]) -> None:
     ablate(parse("evaluate", Ablation, arguments, default=defaults))
 
 
+_VERSION = "version of vnca"
 VARIANTS = {
     "no motion loss": (False, True),
     "no velocity encoding": (True, False),
@@ -93,9 +101,8 @@ def ablate(options: Ablation) -> None:
     smoke = _read(options.frame, options.smoke)
     rules: list[Rule] = []
     found: dict[str, list[MotionMeasures]] = {}
-    for variant, config in _configurations(options):
-        folder = options.out / f"{variant.replace(' ', '_')}-{config.seed}"
-        if not _is_trained(folder, config):
+    for variant, config, folder, is_trained in _runs(options, smoke):
+        if not is_trained:
             say(f"{variant}, seed {config.seed}: {folder}")
             train(
                 Train(
@@ -133,15 +140,57 @@ def _configurations(options: Ablation) -> Iterator[tuple[str, TrainConfig]]:
             yield variant, dataclasses.replace(config, rule=rule, seed=seed)
 
 
-def _is_trained(folder: Path, config: TrainConfig) -> bool:
-    """Whether the folder holds a finished run of this configuration."""
-    if not (folder / MODEL_NAME).exists():
+class _Run(NamedTuple):
+    """A training of the ablation: of which variant, where, and whether it is there already."""
+
+    variant: str
+    config: TrainConfig
+    folder: Path
+    is_trained: bool
+
+
+def _runs(options: Ablation, smoke: Volume) -> list[_Run]:
+    """All trainings, looked up before the first is begun.
+
+    Raises:
+        VncaError: If the picture cannot be read, or a folder holds a run of something else.
+    """
+    style = read_image(options.style)
+    vgg = VGG16.load(options.config.features, choose_device(options.device))
+    runs = []
+    for variant, config in _configurations(options):
+        folder = options.out / f"{variant.replace(' ', '_')}-{config.seed}"
+        wanted = training_inputs(smoke, style, config, vgg)
+        runs.append(_Run(variant, config, folder, _is_trained(folder, wanted, config.iterations)))
+    return runs
+
+
+def _is_trained(folder: Path, wanted: Mapping[str, str], iterations: int) -> bool:
+    """Whether the folder holds a finished run of the wanted inputs.
+
+    Raises:
+        OptionError: If it holds a run of others.
+        ModelError: If it holds a model that cannot be read.
+    """
+    if not (folder / MODEL_NAME).exists() and not (folder / CONFIG_NAME).exists():
         return False
-    trained = Model.load(folder)
-    return (
-        trained.training.get("iterations") == config.iterations
-        and trained.rule.config == config.rule
-    )
+    try:
+        told = json.loads((folder / CONFIG_NAME).read_text())
+        inputs = {**told[FINGERPRINTS], _VERSION: told["vnca"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        raise OptionError(
+            f"{folder}: holds a run that does not tell what it was trained on; choose another --out"
+        ) from None
+    wanted = {**wanted, _VERSION: vnca.__version__}
+    others = [name for name, print_ in wanted.items() if inputs.get(name) != print_]
+    if others:
+        raise OptionError(
+            f"{folder}: holds a run that differs in its {' and '.join(others)}; choose another "
+            "--out, or move it away"
+        )
+    if (folder / CHECKPOINT_NAME).exists() or not (folder / MODEL_NAME).exists():
+        return False  # It was interrupted, and what model there is may be of the run before it.
+    return Model.load(folder).training.get("iterations") == iterations
 
 
 def as_json(measures: MotionMeasures) -> dict[str, Any]:

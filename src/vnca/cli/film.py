@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from vnca.camera import frame_box
 from vnca.colour import srgb_to_linear
 from vnca.errors import BackendUnavailableError, OptionError
 from vnca.io.video import FilmWriter
-from vnca.typing import Box, FloatArray, Index
+from vnca.typing import AnyArray, FloatArray
+from vnca.volume import Volume
 
 if TYPE_CHECKING:
     import torch
@@ -39,7 +40,8 @@ class FilmConfig:
     fps: float = 24.0
     """Frames per second."""
     step: float = 0.5
-    """Distance between samples along a ray, cells; a surface shows terraces where it is long."""
+    """Distance between samples along a ray, in cells, across where these are thinnest; a surface
+    shows terraces where it is long."""
     background: str = "#101014"
     """Colour behind the smoke, #rrggbb."""
 
@@ -59,6 +61,24 @@ class FilmConfig:
         parse_colour(self.background)
 
 
+class Shown(NamedTuple):
+    """A frame with what it takes to draw it.
+
+    Attributes:
+        smoke: The frame; its cells lie where its matrix says, whatever their shape.
+        colour: Linear RGB `[x, y, z, 3]` of the same cells.
+        extinction: Of density 1, per length of the world.
+    """
+
+    smoke: Volume
+    colour: FloatArray
+    extinction: float
+
+
+Bounds = tuple[AnyArray, AnyArray]
+"""The least and greatest corner of a box of the world."""
+
+
 class Film:
     """A film of smoke, seen by a camera framed on a whole sequence."""
 
@@ -66,7 +86,7 @@ class Film:
         self,
         path: Path,
         config: FilmConfig,
-        box: Box,
+        bounds: Bounds,
         *,
         frames: int,
         device: "torch.device | str" = "cpu",
@@ -76,7 +96,7 @@ class Film:
         Args:
             path: mp4, gif or webp.
             config: How to film.
-            box: What to keep in view, index coordinates.
+            bounds: What to keep in view.
             frames: How many will come, which sets the pace of a turning camera.
             device: Where to render.
 
@@ -91,7 +111,7 @@ class Film:
             raise BackendUnavailableError(
                 f"films need {error.name}: pip install 'vnca[train]'"
             ) from error
-        self._config, self._box, self._frames, self._device = config, box, frames, device
+        self._config, self._bounds, self._frames, self._device = config, bounds, frames, device
         self._writer = FilmWriter(path, fps=config.fps)
         self._shown = 0
 
@@ -109,22 +129,12 @@ class Film:
         """Finish the film, or drop it if something failed."""
         self._writer.__exit__(kind, error, trace)
 
-    def add(self, density: FloatArray, colour: FloatArray, origin: Index, *, gamma: float) -> None:
-        """Render the next frame and add it.
-
-        Args:
-            density: `[x, y, z]`.
-            colour: Linear RGB `[x, y, z, 3]`.
-            origin: Index coordinates of the first cell.
-            gamma: Extinction of density 1, per cell.
-        """
+    def add(self, frame: Shown) -> None:
+        """Render the next frame and add it."""
         view = picture(
-            density,
-            colour,
-            origin,
+            frame,
             self._config,
-            box=self._box,
-            gamma=gamma,
+            bounds=self._bounds,
             turned=self._config.turn * self._shown / self._frames,
             device=self._device,
         )
@@ -133,23 +143,23 @@ class Film:
 
 
 def picture(
-    density: FloatArray,
-    colour: FloatArray,
-    origin: Index,
+    frame: Shown,
     config: FilmConfig,
     *,
-    box: Box,
-    gamma: float,
+    bounds: Bounds,
     turned: float,
     device: "torch.device | str" = "cpu",
 ) -> "View":
-    """The view of one frame by a camera framed on `box` that has turned by some degrees."""
+    """The view of one frame by a camera framed on `bounds` that has turned by some degrees."""
     import torch
 
     from vnca.render.view import render
 
-    lower = (np.asarray(box.lower) - origin - 0.5).tolist()
-    upper = (np.asarray(box.upper) - origin - 0.5).tolist()
+    density, colour, place = frame.smoke.density, frame.colour, frame.smoke.cells_to_world
+    # In lengths of a cell, single precision has room for a world of any size.
+    thinnest = _thinnest(place)
+    place = np.diag([1 / thinnest] * 3 + [1.0]) @ place
+    lower, upper = ((corner / thinnest).tolist() for corner in bounds)
     camera = frame_box(
         lower,
         upper,
@@ -167,9 +177,15 @@ def picture(
             camera,
             rows=config.rows,
             columns=config.columns,
-            gamma=gamma,
+            gamma=frame.extinction * thinnest,
             step=config.step,
+            cells_to_world=place,
         )
+
+
+def _thinnest(cells_to_world: AnyArray) -> float:
+    """The least distance in the world between two neighbouring layers of cells."""
+    return float(1 / np.linalg.norm(np.linalg.inv(cells_to_world[:3, :3]), axis=1).max())
 
 
 def parse_colour(text: str) -> list[float]:

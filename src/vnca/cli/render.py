@@ -11,29 +11,28 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from vnca.cli.film import Film, FilmConfig, parse_colour, picture
+from vnca.cli.film import Bounds, Film, FilmConfig, Shown, parse_colour, picture
 from vnca.cli.options import parse, say
 from vnca.cli.progress import tracked
-from vnca.cli.sequence import open_sequence, sequence_region, volumes
+from vnca.cli.sequence import open_sequence, sequence_bounds, volumes
 from vnca.errors import OptionError
-from vnca.files import writable_file
+from vnca.files import existing_file, writable_file
 from vnca.io.image import SUFFIXES as PICTURES
 from vnca.io.image import write_image
 from vnca.io.painted import read_colour
+from vnca.io.provenance import read_provenance
 from vnca.io.sequence import FrameSequence
 from vnca.io.sheet import contact_sheet
 from vnca.io.smoke import SmokeFormat
 from vnca.io.smoke_format import NO_VELOCITY
 from vnca.io.video import SUFFIXES as FILMS
-from vnca.lattice import Lattice
 from vnca.render.brightness import gamma_for_cell_opacity
-from vnca.typing import Box, FloatArray
-from vnca.volume import Volume
+from vnca.typing import FloatArray
 
 TRANSPARENT = (".png", ".exr")
 """Pictures that can go without a background."""
 CELL_OPACITY = {"painted": 0.95, "unpainted": 0.15}
-"""Opacity of a cell of typical smoke that γ is chosen for where none is given."""
+"""Opacity of a cell of typical smoke that γ is chosen for where none is given or told."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,9 @@ class Render:
     colour_grid: str = "Cd"
     """Grid of linear colours; smoke without it is white."""
     gamma: float | None = None
-    """Extinction of density 1, per cell; chosen from the first frame unless given."""
+    """Extinction of density 1, per cell: of what the rule took for 1, per cell of the smoke, as in
+    `vnca stylize`, where a file tells of its painting. Unless given, painted frames are as opaque
+    as they were painted for; for others it is chosen from the first."""
     turntable: int = 0
     """Hold each frame for so many pictures while the camera goes once around the smoke."""
     strip: int = 0
@@ -108,14 +109,13 @@ def render_sequence(options: Render) -> None:
             f"--out {options.out}: {len(sequence)} frames need a film (mp4, gif, webp), "
             "a name such as frame_####.png, or --frames"
         )
-    region = sequence_region(sequence, options.smoke)
-    shown = tracked(
-        _frames(sequence, options, region.lattice), "rendering", len(sequence), "frames"
-    )
+    options = _as_painted(options, sequence)
+    bounds = sequence_bounds(sequence, options.smoke)
+    shown = tracked(_frames(sequence, options), "rendering", len(sequence), "frames")
     if options.is_film:
-        _film(shown, len(sequence), region.box, options)
+        _film(shown, len(sequence), bounds, options)
     else:
-        _pictures(shown, region.box, options)
+        _pictures(shown, bounds, options)
     say(f"rendered: {options.out}")
 
 
@@ -123,59 +123,54 @@ def strip(sequence: FrameSequence, options: Render, count: int) -> list[FloatArr
     """Pictures, linear RGB `[rows, columns, 3]`, of `count` frames evenly spaced in a sequence."""
     picked = sorted({round(at) for at in np.linspace(0, len(sequence) - 1, count)})
     some = FrameSequence(tuple(sequence[at] for at in picked))
-    lattice, box = sequence_region(sequence, options.smoke)
-    return [_picture(frame, box, options) for frame in _frames(some, options, lattice)]
+    options = _as_painted(options, sequence)
+    bounds = sequence_bounds(sequence, options.smoke)
+    return [_picture(frame, bounds, options) for frame in _frames(some, options)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Shown:
-    """A frame with what it takes to draw it."""
+def _as_painted(options: Render, sequence: FrameSequence) -> Render:
+    """With the axis that points up as the files tell it, unless it is given."""
+    told = read_provenance(existing_file(sequence[0].path))
+    if told is None or options.smoke.up_axis is not None:
+        return options
+    return dataclasses.replace(
+        options, smoke=dataclasses.replace(options.smoke, up_axis=told.up_axis)
+    )
 
-    smoke: Volume
-    colour: FloatArray
-    gamma: float
 
-
-def _frames(sequence: FrameSequence, options: Render, lattice: Lattice) -> Iterator[_Shown]:
-    gamma = options.gamma
+def _frames(sequence: FrameSequence, options: Render) -> Iterator[Shown]:
+    chosen: float | None = None  # one for all frames that do not tell, or brightness flickers
     # Nothing here needs velocity, and beside a refined painting it has coarser cells.
     seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
-    for frame, smoke in zip(sequence, volumes(sequence, seen, lattice), strict=True):
-        colour = read_colour(
-            frame.path, options.smoke, grid=options.colour_grid, box=smoke.box, lattice=lattice
-        )
-        if gamma is None and smoke.density.size:
+    for frame, smoke in zip(sequence, volumes(sequence, seen), strict=True):
+        colour = read_colour(frame.path, seen, grid=options.colour_grid, box=smoke.box)
+        told = read_provenance(frame.path)
+        if told is None and chosen is None and smoke.density.any():
             opacity = CELL_OPACITY["unpainted" if colour is None else "painted"]
-            gamma = gamma_for_cell_opacity(smoke.density, opacity)
+            gamma = options.gamma or gamma_for_cell_opacity(smoke.density, opacity)
+            chosen = gamma / smoke.cell_length
         if colour is None:
             colour = np.ones((*smoke.density.shape, 3), dtype=np.float32)
-        yield _Shown(smoke, colour, gamma or 1.0)
+        extinction = told.seen_with(options.gamma) if told else chosen or 1.0
+        yield Shown(smoke, colour, extinction)
 
 
-def _film(shown: Iterator[_Shown], frames: int, box: Box, options: Render) -> None:
+def _film(shown: Iterator[Shown], frames: int, bounds: Bounds, options: Render) -> None:
     repeats = options.turntable or 1
     config = dataclasses.replace(options.film, turn=360.0) if options.turntable else options.film
-    with Film(options.out, config, box, frames=frames * repeats) as film:
+    with Film(options.out, config, bounds, frames=frames * repeats) as film:
         for frame in shown:
             for _ in range(repeats):
-                film.add(frame.smoke.density, frame.colour, frame.smoke.origin, gamma=frame.gamma)
+                film.add(frame)
 
 
-def _pictures(shown: Iterator[_Shown], box: Box, options: Render) -> None:
+def _pictures(shown: Iterator[Shown], bounds: Bounds, options: Render) -> None:
     for frame in shown:
-        write_image(_numbered(options.out, frame.smoke.frame), _picture(frame, box, options))
+        write_image(_numbered(options.out, frame.smoke.frame), _picture(frame, bounds, options))
 
 
-def _picture(frame: _Shown, box: Box, options: Render) -> FloatArray:
-    view = picture(
-        frame.smoke.density,
-        frame.colour,
-        frame.smoke.origin,
-        options.film,
-        box=box,
-        gamma=frame.gamma,
-        turned=0.0,
-    )
+def _picture(frame: Shown, bounds: Bounds, options: Render) -> FloatArray:
+    view = picture(frame, options.film, bounds=bounds, turned=0.0)
     image = view.rgba if options.transparent else view.over(parse_colour(options.film.background))
     return image.cpu().numpy()
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vnca.automaton.rule import SMOKE_THRESHOLD, Rule, density_scale
+from vnca.camera import world_box
 from vnca.cli.options import say
 from vnca.errors import SequenceError
 from vnca.files import existing_file
@@ -108,10 +109,7 @@ def sequence_region(
         if not is_whole:
             resampled.append((frame.path, extent.index_to_world))
     if lattice is None:
-        raise SequenceError(
-            f"{sequence[0].path.parent}: there is no smoke in any frame; "
-            "choose others with --frames or another grid with --density-grid"
-        )
+        raise _without_smoke(sequence)
     if resampled:
         _tell_resampled(*resampled[0], lattice, others=len(resampled) - 1)
     return Region(lattice, box)
@@ -164,6 +162,37 @@ def _tell_resampled(path: Path, index_to_world: AnyArray, lattice: Lattice, *, o
     say(
         f"{path}: its voxels, {sides}, are not the cells of the sequence's lattice, cubes of "
         f"{lattice.spacing:g}; its smoke is resampled to those{also}"
+    )
+
+
+def sequence_bounds(sequence: FrameSequence, smoke: SmokeFormat) -> tuple[AnyArray, AnyArray]:
+    """The least and greatest corner of the world's box that holds the smoke of all frames.
+
+    Files' headers are read, where they tell.
+
+    Raises:
+        SequenceError: If no frame has smoke.
+        FileFormatError: If a frame cannot be read.
+        GridError: If one has no smoke to read.
+    """
+    extents = [smoke_extent(frame.path, smoke) for frame in sequence]
+    boxes = [region_bounds(*extent) for extent in extents if not extent.box.is_empty]
+    if not boxes:
+        raise _without_smoke(sequence)
+    lower, upper = zip(*boxes, strict=True)
+    return np.min(lower, axis=0), np.max(upper, axis=0)
+
+
+def region_bounds(box: Box, index_to_world: AnyArray) -> tuple[AnyArray, AnyArray]:
+    """The least and greatest corner of the world's box around cells, all of each cell inside."""
+    lower, upper = (np.asarray(corner) - 0.5 for corner in box)
+    return world_box(lower, upper, index_to_world)
+
+
+def _without_smoke(sequence: FrameSequence) -> SequenceError:
+    return SequenceError(
+        f"{sequence[0].path.parent}: there is no smoke in any frame; "
+        "choose others with --frames or another grid with --density-grid"
     )
 
 

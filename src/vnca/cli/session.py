@@ -13,7 +13,7 @@ import torch
 from vnca.automaton.model import MODEL_NAME, Model
 from vnca.cli.options import say
 from vnca.cli.progress import Progress
-from vnca.cli.recorded import recorded, restored
+from vnca.cli.recorded import PICTURE_CELLS, recorded, restored
 from vnca.errors import (
     DivergenceError,
     FileFormatError,
@@ -21,7 +21,7 @@ from vnca.errors import (
     OutOfMemoryError,
     VncaError,
 )
-from vnca.features.vgg import VGG16
+from vnca.features.network import FeatureNetwork
 from vnca.io.image import resize, to_srgb8
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.course import CourseConfig
@@ -31,6 +31,8 @@ from vnca.training.preview import preview_sheet
 from vnca.training.run import RunFolder
 from vnca.typing import FloatArray
 
+FINGERPRINTS = "fingerprints"
+"""What says in the configuration of a run what its inputs were, wherever their files lie."""
 THUMBNAIL = 96
 """Rows and columns of the style picture kept in a model file."""
 
@@ -113,10 +115,16 @@ class Session:
             if checkpoint is None:
                 self._keep()
             inputs = {name: self.asked[name] for name in ("frame", "style") if name in self.asked}
-            self.folder.start(trainer.config, {**self.training, "inputs": inputs})
+            facts = {**self.training, "inputs": inputs, FINGERPRINTS: self.inputs}
+            self.folder.start(trainer.config, facts)
             say(
                 f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
                 f"features '{self.training['features']}', {self.training['device']}"
+            )
+            chosen = "" if trainer.config.appearance.style_scale else ", for strokes of three"
+            say(
+                f"the picture is {trainer.picture_cells:.0f} cells wide{chosen} "
+                f"(--appearance.style-scale {trainer.style_scale:.2f})"
             )
             for note in notes:
                 say(note)
@@ -263,12 +271,13 @@ def asked(options: Any) -> dict[str, Any]:
     return recorded(dataclasses.replace(options, **paths, config=config))
 
 
-def judged_by(vgg: VGG16) -> dict[str, Any]:
-    """What a model file tells of the network that judged its pictures."""
+def shown_and_judged(trainer: Trainer, network: FeatureNetwork) -> dict[str, Any]:
+    """What a model file tells of how large its picture was shown, and of what compared with it."""
     return {
-        "features": vgg.name,
-        "features_origin": vgg.origin,
-        "features_dtype": str(vgg.dtype).removeprefix("torch."),
+        PICTURE_CELLS: round(trainer.picture_cells, 2),
+        "features": network.name,
+        "features_origin": network.origin,
+        "features_dtype": str(network.dtype).removeprefix("torch."),
     }
 
 

@@ -13,29 +13,34 @@ from typing import Annotated, Any, Literal
 import tyro
 
 import vnca
-from vnca.automaton.model import Model
+from vnca.automaton.model import MODEL_NAME, Model
 from vnca.automaton.rule import Rule
 from vnca.automaton.stepper import stepper
-from vnca.cli.film import Film, FilmConfig
+from vnca.cli.film import Film, FilmConfig, Shown
 from vnca.cli.options import parse, say
 from vnca.cli.progress import Progress
 from vnca.cli.recorded import recorded_smoke
-from vnca.cli.sequence import open_sequence, placed, require_dense_enough, sequence_region
+from vnca.cli.sequence import (
+    open_sequence,
+    placed,
+    region_bounds,
+    require_dense_enough,
+    sequence_region,
+)
 from vnca.cli.termination import finishing
 from vnca.errors import BackendUnavailableError, OptionError
 from vnca.files import remove_leftovers, writable_file, writable_folder
 from vnca.io.painted import read_colour
+from vnca.io.provenance import read_provenance
 from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.io.video import SUFFIXES as FILMS
 from vnca.kernels.update.backend import choose
 from vnca.kernels.update.native import Precision
-from vnca.lattice import Lattice
 from vnca.stylize.config import StylizeConfig
 from vnca.stylize.painter import OnError, Painter
 from vnca.stylize.roll import Roll
-from vnca.typing import FloatArray
-from vnca.volume import Volume, refined_transform
+from vnca.volume import refined_transform
 
 
 @dataclass(frozen=True)
@@ -57,8 +62,8 @@ class Stylize:
     refine: Literal[1, 2, 3, 4] = 1
     """Paint on a grid so many times as fine as that of the smoke."""
     gamma: float | None = None
-    """Extinction of density 1 in the preview, per cell of the smoke: brightness without training
-    again."""
+    """Extinction of density 1, per cell of the smoke, with which the painting is to be seen:
+    brightness without training again. It is told in the files."""
     density_scale: float | None = None
     """Density that counts as 1; that of the training frame unless given."""
     backend: Literal["auto", "native", "reference"] = "auto"
@@ -116,7 +121,8 @@ def paint(options: Stylize, model: Model | None = None) -> None:
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
-    rule = (model or Model.load(options.model)).rule
+    model = model or Model.load(options.model)
+    rule = model.rule
     scales = dataclasses.replace(
         rule.scales,
         density=options.density_scale or rule.scales.density,
@@ -141,6 +147,7 @@ def paint(options: Stylize, model: Model | None = None) -> None:
         options.config,
         region.box,
     ).refined(options.refine)
+    facts = _facts(options, model, roll)
     painter = Painter(
         sequence,
         options.out,
@@ -154,11 +161,13 @@ def paint(options: Stylize, model: Model | None = None) -> None:
             "--refine": options.refine,
             "the model": _digest(rule),
             "the list of frames": [frame.path.name for frame in sequence],
-            "the box of the smoke": region.box,
             "the place of its cells in the world": region.lattice.to_world.tolist(),
+            "the box of the smoke": region.box,
             "--backend": backend,
             "--precision": options.precision,
             "--density-scale": scales.density,
+            "--gamma": scales.gamma,
+            "the name of the model": facts["model"],
             "--colour-grid": options.colour_grid,
             **{
                 f"--{name.replace('_', '-')}": value
@@ -170,6 +179,7 @@ def paint(options: Stylize, model: Model | None = None) -> None:
         },
         tell=say,
         refine=options.refine,
+        facts=facts,
     )
     is_filmed = _paint(painter, options)
     say(f"painted: {options.out}")
@@ -194,8 +204,7 @@ def _paint(painter: Painter, options: Stylize) -> bool:
     Returns:
         Whether it was filmed.
     """
-    sequence, scales = painter.sequence, painter.roll.rule.scales
-    finished = 0
+    sequence, finished = painter.sequence, 0
     with ExitStack() as stack:
         film = _film(options, painter, stack)
         unfinished = painter.begin(resume=options.resume)
@@ -208,10 +217,7 @@ def _paint(painter: Painter, options: Stylize) -> bool:
             ):
                 for finished, (frame, path) in enumerate(zip(sequence, paths, strict=True), 1):
                     if film is not None and path is not None:
-                        # As the file has it, so that a film is the same with and without --resume.
-                        smoke, colour = _read_painted(path, frame.path, options, painter.lattice)
-                        gamma = scales.gamma / scales.density
-                        film.add(smoke.density, colour, smoke.origin, gamma=gamma)
+                        film.add(_read_painted(path, frame.path, options))
                     progress.show(finished)
                     stop_if_asked()
         except KeyboardInterrupt:
@@ -226,8 +232,10 @@ def _film(options: Stylize, painter: Painter, stack: ExitStack) -> Film | None:
     """The film of a preview, if one is wanted and what it takes is installed."""
     if options.preview is None:
         return None
+    cells = refined_transform(painter.lattice.to_world, options.refine)
+    bounds = region_bounds(painter.roll.box, cells)
     try:
-        film = Film(options.preview, options.film, painter.roll.box, frames=len(painter.sequence))
+        film = Film(options.preview, options.film, bounds, frames=len(painter.sequence))
         return stack.enter_context(film)
     except BackendUnavailableError as error:
         later = f"vnca render {options.out} --out {options.preview}"
@@ -235,14 +243,31 @@ def _film(options: Stylize, painter: Painter, stack: ExitStack) -> Film | None:
         return None
 
 
-def _read_painted(
-    path: Path, source: Path, options: Stylize, lattice: Lattice
-) -> tuple[Volume, FloatArray]:
-    """Smoke and colour of a painted frame, on the lattice that was painted on."""
+def _read_painted(path: Path, source: Path, options: Stylize) -> Shown:
+    """A painted frame as its file has it: the film is the same with --resume, and by `render`."""
     up = up_axis_of(source, options.smoke)
     format = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY, up_axis=up)
-    lattice = Lattice(refined_transform(lattice.to_world, options.refine))
-    smoke = read_smoke(path, format, lattice=lattice)
-    colour = read_colour(path, format, grid=options.colour_grid[0], box=smoke.box, lattice=lattice)
+    smoke, told = read_smoke(path, format), read_provenance(path)
+    colour = read_colour(path, format, grid=options.colour_grid[0], box=smoke.box)
+    assert told is not None, "it was written a moment ago"
     assert colour is not None, "it was written a moment ago"
-    return smoke, colour
+    return Shown(smoke, colour, told.extinction)
+
+
+def _facts(options: Stylize, model: Model, roll: Roll) -> dict[str, str | int | float]:
+    """What painted files tell of the rule and the options, beside what they are painted from."""
+    path = options.model.resolve()
+    name = path.parent.name if path.name == MODEL_NAME else path.stem
+    config = options.config
+    return {
+        "version": vnca.__version__,
+        "model": name,
+        "style": str(model.training.get("style", "")),
+        "refine": options.refine,
+        "strength": config.strength,
+        "density_strength": config.density_strength,
+        "steps_per_frame": roll.steps_per_frame,
+        "warmup": config.warmup,
+        "domain": roll.domain_kind,
+        "seed": config.seed,
+    }

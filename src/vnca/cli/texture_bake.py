@@ -88,18 +88,20 @@ def _bake(options: Bake, rule: Rule, mesh: Mesh, place: Placement) -> None:
     # Unwrapping can fail; growing, which takes longest, cannot.
     if mesh.face_count > MANY_FACES:
         say(f"{options.mesh}: {mesh.face_count} faces; without UVs, unwrapping takes long")
-    unwrappings, texels = unwrapped(mesh, options.unwrap, size=options.size)
-    kept = all(unwrapping.source is None for unwrapping in unwrappings)
+    atlas = unwrapped(mesh, options.unwrap, size=options.size)
+    if atlas.fault is not None:
+        say(f"{options.mesh}: its UVs cannot be used ({atlas.fault}); it gets new ones")
+    kept = all(unwrapping.source is None for unwrapping in atlas.unwrappings)
     say(
         f"{len(mesh.surfaces)} surfaces, {mesh.face_count} faces, "
         f"{'their own UVs' if kept else 'new UVs'}, "
-        f"{len(texels.texel) / options.size**2:.0%} of the texture used"
+        f"{len(atlas.texels.texel) / options.size**2:.0%} of the texture used"
     )
     states = grown_blocks(rule, options.grow, max(options.animate, 1))
     for number, block in enumerate(states, 1):
-        png = to_png(bake(block, texels, place))
+        png = to_png(bake(block, atlas.texels, place))
         if number == 1:
-            put_on(mesh, unwrappings, png)
+            put_on(mesh, atlas.unwrappings, png)
             mesh.glb.write(options.out)
         if options.animate:
             with whole_file(_frame(options.out, number)) as temporary:

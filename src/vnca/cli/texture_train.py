@@ -17,12 +17,12 @@ from vnca.cli.session import (
     choose_device,
     fitting,
     interrupted,
-    judged_by,
     run_folder,
+    shown_and_judged,
 )
 from vnca.cli.texture_block import KIND
-from vnca.features.vgg import VGG16
-from vnca.io.image import read_image
+from vnca.features.load import load_network
+from vnca.io.image import read_style
 from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.orientation import UpAxis
 from vnca.texturing.config import PRESETS, TextureConfig
@@ -42,7 +42,7 @@ class TrainTexture(TrainingOptions):
     """
 
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
-    """The picture: PNG, JPEG or WebP."""
+    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
     mesh: Path | None = None
     """Look at this mesh too while training: GLB, OBJ, PLY or STL."""
     up_axis: UpAxis | None = None
@@ -82,16 +82,16 @@ def train(options: TrainTexture, checkpoint: Checkpoint | None = None) -> Path:
             diverges, or memory runs out.
     """
     folder = run_folder(options.out, overwrite=options.overwrite, checkpoint=checkpoint)
-    style = read_image(options.style)
+    style = read_style(options.style)
     device = choose_device(options.device)
     mesh = read_mesh(options.mesh, options.up_axis) if options.mesh else None
     config = options.config
     torch.use_deterministic_algorithms(True)
-    vgg = VGG16.load(config.features, device)
+    network = load_network(config.features, device)
     with fitting(config, "this block"):
         budget = memory_budget(options.memory_budget)
         trainer = texture_trainer(
-            style, config, vgg, mesh=mesh, device=device, memory_budget=budget
+            style, config, network, mesh=mesh, device=device, memory_budget=budget
         )
     training = {
         "kind": KIND,
@@ -101,7 +101,7 @@ def train(options: TrainTexture, checkpoint: Checkpoint | None = None) -> Path:
         "block": config.block,
         "seed": config.seed,
         "device": str(device),
-        **judged_by(vgg),
+        **shown_and_judged(trainer, network),
     }
     session = Session(
         command=COMMAND,
@@ -109,7 +109,7 @@ def train(options: TrainTexture, checkpoint: Checkpoint | None = None) -> Path:
         folder=folder,
         style=style,
         training=training,
-        inputs=fingerprints(style, config, vgg, mesh=_surfaces(mesh)),
+        inputs=fingerprints(style, config, network, mesh=_surfaces(mesh)),
         asked=asked(options),
         preview_every=options.preview_every,
     )

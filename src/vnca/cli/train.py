@@ -13,7 +13,6 @@ from vnca.automaton.model import MODEL_NAME, Model
 from vnca.automaton.rule import Rule, RuleConfig
 from vnca.cli import texture_train
 from vnca.cli.options import chosen, is_given, parse, say
-from vnca.cli.recorded import PICTURE_CELLS
 from vnca.cli.sequence import beside, read_alone
 from vnca.cli.session import (
     ResumeOptions,
@@ -23,13 +22,14 @@ from vnca.cli.session import (
     choose_device,
     fitting,
     interrupted,
-    judged_by,
     run_folder,
+    shown_and_judged,
 )
 from vnca.errors import GridError, OptionError
-from vnca.features.vgg import VGG16
+from vnca.features.load import load_network
+from vnca.features.network import FeatureNetwork
 from vnca.files import remove_file
-from vnca.io.image import read_image
+from vnca.io.image import read_style
 from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY
 from vnca.texturing.beginning import SHAPE, SHARES, beginning_config, deaf_to_priors
@@ -38,7 +38,8 @@ from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import PRESETS, TrainConfig
 from vnca.training.memory import memory_budget
 from vnca.training.smoke import smoke_trainer
-from vnca.training.smoke_scene import smoke_bounds, view_width
+from vnca.typing import FloatArray
+from vnca.volume import Volume
 
 COMMAND = "train"
 TEXTURE_FOLDER = "texture"
@@ -55,7 +56,7 @@ class Train(TrainingOptions):
     frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
-    """The picture: PNG, JPEG or WebP."""
+    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
     preset: Literal["draft", "standard", "paper"] = "draft"
     """Values of all options below that are not given."""
     texture: float | None = None
@@ -107,7 +108,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
             diverges, or memory runs out.
     """
     folder = run_folder(options.out, overwrite=options.overwrite, checkpoint=checkpoint)
-    style = read_image(options.style)
+    style = read_style(options.style)
     device = choose_device(options.device)
     smoke_format = beside(options.frame, options.smoke)
     smoke = read_alone(options.frame, smoke_format)
@@ -124,11 +125,10 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
             config, rule=dataclasses.replace(config.rule, velocity_prior=False)
         )
     torch.use_deterministic_algorithms(True)
-    vgg = VGG16.load(config.features, device)
+    network = load_network(config.features, device)
     with fitting(config, "this frame"):
         budget = memory_budget(options.memory_budget)
-        trainer = smoke_trainer(smoke, style, config, vgg, device=device, memory_budget=budget)
-    width = view_width(smoke_bounds(smoke, trainer.rule().scales.density))
+        trainer = smoke_trainer(smoke, style, config, network, device=device, memory_budget=budget)
     training = {
         "frame": options.frame.name,
         "style": options.style.name,
@@ -136,19 +136,15 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         "seed": config.seed,
         "device": str(device),
         "smoke": dataclasses.asdict(smoke_format),
-        PICTURE_CELLS: round(config.appearance.style_scale * width, 2),
-        **judged_by(vgg),
+        **shown_and_judged(trainer, network),
     }
-    frame = [smoke.density, smoke.origin]
-    if smoke.velocity is not None:
-        frame.append(smoke.velocity)
     session = Session(
         command=COMMAND,
         trainer=trainer,
         folder=folder,
         style=style,
         training=training,
-        inputs=fingerprints(style, config, vgg, frame=frame),
+        inputs=training_inputs(smoke, style, config, network),
         asked=asked(dataclasses.replace(options, smoke=smoke_format)),
         preview_every=options.preview_every,
     )
@@ -156,7 +152,7 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         if checkpoint is not None:
             checkpoint.require(session.inputs, folder.path / CHECKPOINT_NAME)
         share = SHARES[options.preset] if options.texture is None else options.texture
-        beginning = beginning_config(config, share, width)
+        beginning = beginning_config(config, share, trainer.picture_cells)
         if options.begin_with is not None:
             trainer.begin_with(deaf_to_priors(_given(options.begin_with, config.rule)))
         elif beginning is not None:
@@ -172,6 +168,16 @@ def train(options: Train, checkpoint: Checkpoint | None = None) -> Path:
         notes.append(f"{options.frame}: nothing moves in it; its texture is not taught to move")
     session.run(checkpoint, *notes)
     return options.out
+
+
+def training_inputs(
+    smoke: Volume, style: FloatArray, config: TrainConfig, network: FeatureNetwork
+) -> dict[str, str]:
+    """What tells a training on smoke from others: the `fingerprints` of what goes into it."""
+    frame = [smoke.density, smoke.origin]
+    if smoke.velocity is not None:
+        frame.append(smoke.velocity)
+    return fingerprints(style, config, network, frame=frame)
 
 
 def _given(path: Path, wanted: RuleConfig) -> Rule:

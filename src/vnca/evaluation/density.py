@@ -13,12 +13,10 @@ class DensityChange(NamedTuple):
     Attributes:
         moved: Σ|d' − d| / Σd: the share of the mass that is taken away or added.
         mass_change: Σd' / Σd − 1: what this comes to in total.
-        appeared: Cells with smoke that had none before.
     """
 
     moved: float
     mass_change: float
-    appeared: int
 
     @classmethod
     def of(cls, painting: Painting) -> "DensityChange":
@@ -30,5 +28,4 @@ class DensityChange(NamedTuple):
         return cls(
             moved=float(np.abs(after - before).sum() / mass),
             mass_change=float((after.sum() - before.sum()) / mass),
-            appeared=int(((before <= 0) & (after > 0)).sum()),
         )

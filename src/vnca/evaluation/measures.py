@@ -10,6 +10,12 @@ from vnca.evaluation.coherence import LONG, Agreement, mean_agreement
 from vnca.evaluation.likeness import joined_likeness
 from vnca.evaluation.survey import Survey, TextureMotion
 
+_PART = {
+    True: "which the rule was trained to please: it says less than the others",
+    False: "which had no part in training",
+    None: "which may have had a part in training",
+}
+
 
 @dataclass(frozen=True)
 class Measure:
@@ -74,6 +80,19 @@ def _style(survey: Survey) -> Iterable[Measure]:
             "frames": {frame: likeness.gap_closed for frame, likeness in survey.style.items()},
         },
     )
+    for judge in survey.judges:
+        known = [*judge.shares.values()]
+        yield Measure(
+            f"style.by_{judge.name}",
+            f"Style gap closed, by {judge.name}",
+            f"The same in the eyes of the network '{judge.name}', {_PART[judge.trained_with]}.",
+            float(np.mean(known)) if known else None,
+            "share of the gap",
+            "higher",
+            unstylized=0.0,
+            more={"trained_with": judge.trained_with, "frames": judge.shares},
+            reason=judge.reason or "the smoke is opaque in no frame that was looked at",
+        )
 
 
 def _views(survey: Survey) -> Iterable[Measure]:
@@ -226,15 +245,6 @@ def _density(survey: Survey) -> Iterable[Measure]:
         None,
         unstylized=0.0,
         more={"frames": moved},
-    )
-    yield Measure(
-        "density.appeared",
-        "Smoke out of nowhere",
-        "Cells that hold smoke and held none: there must be none.",
-        float(sum(change.appeared for change in changes)),
-        "cells",
-        "lower",
-        unstylized=0.0,
     )
 
 

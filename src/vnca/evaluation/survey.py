@@ -1,6 +1,6 @@
 """All measures of a painted sequence, in one pass over its frames."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from vnca.errors import GridError
 from vnca.evaluation.coherence import Agreement, Coherence, Step, around
 from vnca.evaluation.density import DensityChange
 from vnca.evaluation.estimators import Estimator, estimators
+from vnca.evaluation.judges import Judge
 from vnca.evaluation.likeness import SIDES, Likeness, joined_likeness, likeness
 from vnca.evaluation.motion import (
     MotionMeasures,
@@ -97,6 +98,7 @@ class Survey:
     Attributes:
         frames: Numbers of the frames painted.
         style: The likeness of four sides of some frames, by frame; at least of one.
+        judges: What networks say of the same.
         turn: The middle frame.
         steps: How each frame agrees with those before.
         density: How each frame's density changes.
@@ -105,6 +107,7 @@ class Survey:
 
     frames: tuple[int, ...]
     style: dict[int, Likeness]
+    judges: tuple[Judge, ...]
     turn: Turn
     steps: tuple[Step, ...]
     density: tuple[DensityChange, ...]
@@ -112,7 +115,12 @@ class Survey:
 
 
 def survey(
-    paintings: Iterable[Painting], count: int, rule: Rule, stage: Stage, gauge: StyleGauge
+    paintings: Iterable[Painting],
+    count: int,
+    rule: Rule,
+    stage: Stage,
+    gauge: StyleGauge,
+    judges: Sequence[Judge] = (),
 ) -> Survey:
     """Measure a sequence while it is painted; no more than a few frames are kept at a time.
 
@@ -122,6 +130,7 @@ def survey(
         rule: What paints them.
         stage: How they are looked at.
         gauge: What they are compared with.
+        judges: Networks that compare them with it, too.
 
     Raises:
         GridError: If the smoke of the middle frame is opaque nowhere.
@@ -144,6 +153,8 @@ def survey(
             pairs = [stage.look_twice(painted, plain, sight) for sight in SIDES]
             if (found := likeness(gauge, pairs)) is not None:
                 style[smoke.frame] = found
+                for judge in judges:
+                    judge.look(smoke.frame, pairs, gauge)
         if at == count // 2:
             ring = tuple(stage.look_twice(painted, plain, sight) for sight in (*RING, *POLES))
             turn = Turn(
@@ -157,6 +168,7 @@ def survey(
     return Survey(
         tuple(frames),
         style or {turn.frame: turn.likeness},
+        tuple(judges),
         turn,
         coherence.steps,
         tuple(density),

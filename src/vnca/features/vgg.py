@@ -1,6 +1,6 @@
-"""The frozen VGG16 whose activations say what a picture looks like.
+"""The frozen VGG16 or VGG19 whose activations say what a picture looks like.
 
-Reference: Simonyan and Zisserman 2015, configuration D.
+Reference: Simonyan and Zisserman 2015, configurations D and E.
 """
 
 from collections.abc import Sequence
@@ -10,23 +10,25 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
 
-from vnca.errors import OptionError, ShapeError
-from vnca.features.weights import CONVOLUTIONS, Weights, load_weights
+from vnca.features.network import require_fitting
+from vnca.features.weights import Weights, convolutions, load_weights
 
 STYLE_LAYERS = ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1")
 """The five layers texture automata compare (Niklasson et al. 2021)."""
 
 
 class VGG16(nn.Module):
-    """VGG16's convolutions with frozen weights.
+    """VGG16's convolutions with frozen weights; with more of them where the weights are VGG19's.
 
     Attributes:
         name: Where the weights come from; losses of different ones cannot be compared.
         origin: SHA-256 of the file they were first read from.
         dtype: Of the arithmetic inside; features come in the picture's.
+        style_layers: The layers that are compared unless others are asked for.
     """
 
     mean: Tensor
+    style_layers: tuple[str, ...] = STYLE_LAYERS
 
     def __init__(self, weights: Weights, dtype: torch.dtype = torch.float32) -> None:
         super().__init__()
@@ -35,7 +37,9 @@ class VGG16(nn.Module):
         self.origin = weights.origin
         self.register_buffer("mean", torch.tensor(weights.mean).view(1, 3, 1, 1))
         self.convolutions = nn.ModuleDict()
-        for conv, (inputs, outputs) in CONVOLUTIONS.items():
+        for conv, (inputs, outputs) in convolutions(weights.depth).items():
+            if f"{conv}.weight" not in weights.tensors:
+                break
             layer = nn.Conv2d(inputs, outputs, 3, padding=1)
             layer.load_state_dict(
                 {kind: weights.tensors[f"{conv}.{kind}"] for kind in ("weight", "bias")}
@@ -68,13 +72,17 @@ class VGG16(nn.Module):
         device = torch.device(device or "cpu")
         return cls(load_weights(source), dtype or _fast_dtype(device)).to(device)
 
-    def features(
-        self, image: Float[Tensor, "b 3 r c"], layers: Sequence[str] = STYLE_LAYERS
-    ) -> list[Float[Tensor, "b _ _ _"]]:
-        """Activations after the ReLU of each of `layers`, in that order.
+    @property
+    def device(self) -> torch.device:
+        """Where it computes."""
+        return self.mean.device
 
-        Nothing is computed beyond the deepest. Differentiable in `image`. Block `B` has
-        2^(B−1) times fewer rows and columns than the image, rounded up.
+    def features(
+        self, image: Float[Tensor, "b 3 r c"], layers: Sequence[str] | None = None
+    ) -> list[Float[Tensor, "b _ _ _"]]:
+        """Activations after the ReLU of each of `layers`, as `FeatureNetwork.features` has it.
+
+        Block `B` has 2^(B−1) times fewer rows and columns than the image, rounded up.
 
         Args:
             image: sRGB in 0–1.
@@ -84,16 +92,10 @@ class VGG16(nn.Module):
             OptionError: If a layer does not exist.
             ShapeError: If the image is smaller than 32×32 or has not three channels.
         """
+        layers = self.style_layers if layers is None else layers
+        known = [conv.replace("conv", "relu") for conv in self.convolutions]
+        require_fitting(self, image, layers, known)
         wanted = [layer.replace("relu", "conv") for layer in layers]
-        for layer, conv in zip(layers, wanted, strict=True):
-            if conv not in CONVOLUTIONS or not layer.startswith("relu"):
-                known = ", ".join(name.replace("conv", "relu") for name in CONVOLUTIONS)
-                raise OptionError(f"layer {layer!r}: expected one of {known}")
-        if image.ndim != 4 or image.shape[1] != 3 or min(image.shape[2:]) < 32:
-            raise ShapeError(
-                f"picture for VGG16: expected [b, 3, r, c] with at least 32 rows and columns, "
-                f"got {tuple(image.shape)}"
-            )
         x = (image - self.mean).to(self.dtype, memory_format=torch.channels_last)
         found: dict[str, Tensor] = {}
         for conv, layer in self.convolutions.items():

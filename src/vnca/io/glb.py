@@ -6,10 +6,12 @@ skins, lights, extensions, extras) is written back as it came.
 Reference: Khronos glTF 2.0 specification, sections 3.6 (accessors) and 4 (GLB).
 """
 
+import base64
 import json
 import struct
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote_to_bytes
 
 import numpy as np
 
@@ -23,7 +25,7 @@ _DTYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: 
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 DAMAGE = (KeyError, TypeError, AttributeError, ValueError, IndexError, OverflowError)
 """What using a document raises whose JSON holds other things than glTF says."""
-_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+_MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 class Glb:
@@ -44,7 +46,8 @@ class Glb:
         """Read a `.glb` file.
 
         Raises:
-            FileFormatError: If it is missing, not GLB, damaged, compressed or in several files.
+            FileFormatError: If it is missing, not GLB, damaged, compressed by meshopt or in several
+                files.
         """
         return cls.parse(existing_file(path).read_bytes(), path)
 
@@ -52,30 +55,35 @@ class Glb:
     def parse(cls, data: bytes, path: Path) -> "Glb":
         """The document in the bytes of a GLB file; `path` is for messages.
 
+        Buffers that the JSON holds as text are read too, bytes behind the end that the file names
+        are not. Meshes compressed by Draco stay so.
+
         Raises:
-            FileFormatError: If it is not GLB, damaged, compressed or in several files.
+            FileFormatError: If it is not GLB, damaged, compressed by meshopt or in several files.
         """
         if len(data) < 20 or struct.unpack_from("<I", data)[0] != _MAGIC:
             raise FileFormatError(f"{path}: not a GLB file")
-        version = struct.unpack_from("<I", data, 4)[0]
+        version, end = struct.unpack_from("<II", data, 4)
         if version != _VERSION:
             raise FileFormatError(f"{path}: GLB version {version}; only 2 is read")
         chunks, at = {}, 12
-        while at + 8 <= len(data):
+        while at + 8 <= len(data) and (at < end or _JSON not in chunks):
             length, kind = struct.unpack_from("<II", data, at)
             if at + 8 + length > len(data):
                 raise FileFormatError(f"{path}: the file is cut off")
             chunks.setdefault(kind, data[at + 8 : at + 8 + length])
             at += 8 + length + -length % 4
         try:
-            document = json.loads(chunks[_JSON])
+            # It should end in spaces, but some writers fill up with zeros, as the other chunk does.
+            document = json.loads(chunks[_JSON].rstrip(b"\0"))
         except (KeyError, ValueError, RecursionError) as error:
             raise FileFormatError(f"{path}: damaged, its JSON cannot be read") from error
         if not isinstance(document, dict):
             raise FileFormatError(f"{path}: damaged, its JSON is not a document")
-        glb = cls(path, document, chunks.get(_BIN, b""))
+        glb = cls(path, document)
         try:
-            glb._check()
+            glb._require_plain()
+            glb._gather(chunks.get(_BIN, b""))
         except DAMAGE as error:
             raise FileFormatError(f"{path}: damaged, its JSON is no glTF document") from error
         return glb
@@ -116,6 +124,10 @@ class Glb:
             raise FileFormatError(f"{self.path}: damaged, there is no {index} among its {kind}")
         return entries[index]
 
+    def type_of(self, accessor: int) -> np.dtype[Any]:
+        """The type that an accessor's values are stored in; KeyError if glTF has no such type."""
+        return np.dtype(_DTYPES[self.item("accessors", accessor)["componentType"]])
+
     def stored(self, accessor: int) -> AnyArray:
         """Values `[count, components]` of an accessor, of the type they are stored in.
 
@@ -124,7 +136,7 @@ class Glb:
         """
         entry = self.item("accessors", accessor)
         try:
-            dtype, width = np.dtype(_DTYPES[entry["componentType"]]), _COMPONENTS[entry["type"]]
+            dtype, width = self.type_of(accessor), _COMPONENTS[entry["type"]]
             count = int(entry["count"])
             if "bufferView" in entry:
                 values = self._viewed(entry["bufferView"], entry.get("byteOffset", 0),
@@ -193,13 +205,25 @@ class Glb:
         Raises:
             FileFormatError: If it reaches beyond the file.
         """
-        entry = self.item("bufferViews", view)
-        start, length = entry.get("byteOffset", 0), entry.get("byteLength", -1)
-        if not (isinstance(start, int) and isinstance(length, int)) or (
-            start < 0 or length < 0 or start + length > len(self._blob)
-        ):
-            raise FileFormatError(f"{self.path}: damaged, buffer view {view} is out of the file")
+        start, length = self._extent(view, len(self._blob))
         return bytes(self._blob[start : start + length])
+
+    def picture(self, index: int) -> bytes:
+        """The file of a picture that is in this one.
+
+        Raises:
+            FileFormatError: If it is in a file of its own, or reaches beyond this one.
+        """
+        entry = self.item("images", index)
+        if "bufferView" in entry:
+            return self.bytes_of(entry["bufferView"])
+        return self._embedded(entry["uri"])
+
+    def drop_extension(self, name: str) -> None:
+        """No longer list an extension that nothing uses any more."""
+        for listed in ("extensionsUsed", "extensionsRequired"):
+            if name in self.document.get(listed, []):
+                self.document[listed] = [kept for kept in self.document[listed] if kept != name]
 
     def _viewed(
         self, view: int, offset: int, dtype: np.dtype[Any], count: int, width: int
@@ -231,14 +255,60 @@ class Glb:
         first = dict(next(iter(self.document.get("buffers", [])), {}))
         return [{**first, "byteLength": len(self._blob)}] if self._blob else []
 
-    def _check(self) -> None:
-        used = self.document.get("extensionsRequired", [])
-        if compressed := [name for name in _COMPRESSED if name in used]:
+    def _extent(self, view: int, size: int) -> tuple[int, int]:
+        """Where a buffer view begins in a buffer of `size` bytes, and its length."""
+        entry = self.item("bufferViews", view)
+        start, length = entry.get("byteOffset", 0), entry.get("byteLength", -1)
+        if not (isinstance(start, int) and isinstance(length, int)) or (
+            start < 0 or length < 0 or start + length > size
+        ):
+            raise FileFormatError(f"{self.path}: damaged, buffer view {view} is out of the file")
+        return start, length
+
+    def _embedded(self, uri: str) -> bytes:
+        """What a URI holds that is no address but the data themselves.
+
+        Reference: RFC 2397.
+        """
+        head, _, text = uri.partition(",")
+        if not head.startswith("data:"):
             raise FileFormatError(
-                f"{self.path}: its meshes are compressed ({compressed[0]}); export it without"
+                f"{self.path}: has data outside the file ({uri}); export it as one GLB file"
             )
+        data = unquote_to_bytes(text)
+        return (
+            base64.b64decode(data + b"=" * (-len(data) % 4)) if head.endswith(";base64") else data
+        )
+
+    def _gather(self, chunk: bytes) -> None:
+        """Put all buffers into one block."""
         buffers = self.document.get("buffers", [])
-        if len(buffers) > 1 or any("uri" in buffer for buffer in buffers):
-            raise FileFormatError(
-                f"{self.path}: has data outside the file; export it as one GLB file"
-            )
+        parts = [self._embedded(b["uri"]) if "uri" in b else b"" for b in buffers]
+        if buffers and "uri" not in buffers[0]:
+            parts[0] = chunk
+        starts = []
+        for part in parts:
+            self._blob += bytes(-len(self._blob) % 8)
+            starts.append(len(self._blob))
+            self._blob += part
+        for view, entry in enumerate(self.document.get("bufferViews", [])):
+            buffer = entry.get("buffer", 0)
+            if buffer:
+                start, _ = self._extent(view, len(parts[buffer]))
+                entry |= {"buffer": 0, "byteOffset": starts[buffer] + start}
+        if buffers:
+            first = {key: value for key, value in buffers[0].items() if key != "uri"}
+            self.document["buffers"] = [first]
+
+    def _require_plain(self) -> None:
+        """Refuse data that meshopt compressed; where plain ones stand beside them, keep those."""
+        required = self.document.get("extensionsRequired", [])
+        for name in _MESHOPT:
+            if name in required:
+                raise FileFormatError(
+                    f"{self.path}: its meshes are compressed ({name}), which is not read; export "
+                    "it without that, or with Draco"
+                )
+            for entry in self.document.get("bufferViews", []):
+                entry.get("extensions", {}).pop(name, None)
+            self.drop_extension(name)

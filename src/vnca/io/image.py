@@ -3,8 +3,13 @@
 Where there is an alpha channel, colour in memory is premultiplied by it.
 """
 
+import os
+import re
+import sys
 import warnings
-from io import BytesIO
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageCms, ImageOps
 
-from vnca.colour import linear_to_srgb, srgb_to_linear
-from vnca.errors import BackendUnavailableError, FileFormatError, OptionError, ShapeError
+from vnca.colour import linear_to_srgb, luminance, srgb_to_linear
+from vnca.errors import FileFormatError, OptionError, ShapeError, VncaError
 from vnca.files import existing_file, whole_file
+from vnca.io import exr, hdr
+from vnca.io.exr import write_exr
 from vnca.typing import AnyArray, FloatArray
 
 _ENCODERS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -25,45 +32,80 @@ _ENCODERS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 SUFFIXES = (*_ENCODERS, ".exr")
 """What `write_image` writes."""
-FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "GIF", "BMP", "PPM", "JPEG2000")
-"""What is read. Pillow knows more, some of it decoded by other programs (EPS) or hardly tested."""
-_LARGEST_HALF = 65504.0
+FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "GIF", "BMP", "PPM", "JPEG2000", "AVIF")
+"""What Pillow reads for us. It knows more, some of it decoded by other programs (EPS) or hardly
+tested."""
+_READ = "PNG, JPEG, WebP, AVIF, TIFF, GIF, BMP, PPM, JPEG 2000, TGA, OpenEXR, Radiance HDR"
+_KINDS = (
+    (rb"\x89PNG|\xff\xd8\xff|GIF8", "a picture that is damaged"),
+    (rb"....ftypavi[fs]", "AVIF that is damaged, or that this Pillow was built without"),
+    (rb"II\*\0|MM\0\*|II\+\0|MM\0\+", "TIFF of a kind that is not read"),
+    (rb"8BPS", "a Photoshop document"),
+    (rb"gimp xcf", "a GIMP document"),
+    (rb"PK\x03\x04", "an archive, or a document in one, such as of Krita"),
+    (rb"\xff\x0a|\0\0\0\x0cJXL ", "JPEG XL"),
+    (rb"....ftyp(hei[cfmsx]|hev[cmsx]|mif1|msf1)", "HEIC"),
+    (rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI ", "a film"),
+    (rb"DDS |\xabKTX", "a texture compressed for graphics cards"),
+    (rb"%PDF|%!PS|\xc5\xd0\xd3\xc6", "PDF or PostScript"),
+    (rb"\s*<(\?xml|svg)", "SVG or other XML"),
+    (rb"(?i)\s*<(!doctype html|html)", "a web page"),
+    (rb" BDV\0", "an OpenVDB file"),
+    (rb"glTF", "a GLB mesh"),
+)
+_TGA_END = b"TRUEVISION-XFILE.\0"
+# In scene-linear pictures: a stop above white.
+_GLARING = 2.0
+_SMALLEST_STYLE = 8
 
 
 def read_image(path: Path) -> FloatArray:
-    """Read a picture (PNG, JPEG, WebP, TIFF, …) upright, as linear RGB.
+    """Read a picture upright, as linear RGB; its content decides the format, not its name.
 
-    Colour profiles are converted to sRGB. Transparent parts are laid over white, as on paper;
-    of an animation the first frame is taken. Grey floating-point pictures count as linear.
+    PNG, JPEG, WebP, AVIF, TIFF, GIF, BMP, PPM, JPEG 2000, TGA, OpenEXR and Radiance HDR. Colour
+    profiles, and primaries that OpenEXR files name, are converted to sRGB's. Transparent parts are
+    laid over white, as on paper; of an animation the first frame is taken. OpenEXR, Radiance and
+    grey floating-point pictures hold scene-linear light: it is clipped to [0, 1], as a viewer
+    shows it at exposure 0, NaN becomes black, and a picture that is mostly glare is refused.
 
     Returns:
-        `[row, column, 3]`, nominally in [0, 1].
+        `[row, column, 3]` in [0, 1].
 
     Raises:
-        FileFormatError: If the file is missing, not a picture, damaged, or larger than
-            Pillow's limit against decompression bombs (89 million pixels).
+        FileFormatError: If the file is missing, not a picture, damaged, overexposed, or larger
+            than Pillow's limit against decompression bombs (89 million pixels).
+        BackendUnavailableError: If the package that the format needs is not installed.
     """
-    path = existing_file(path)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            warnings.filterwarnings("ignore", category=UserWarning, module="PIL")
-            # From memory: Pillow asks a file for as many bytes as a chunk says it has, and Python
-            # makes room for them all before it reads.
-            with Image.open(BytesIO(path.read_bytes()), formats=FORMATS) as image:
-                return _linear_rgb(ImageOps.exif_transpose(image))
-    except Image.UnidentifiedImageError as error:
+    return _over_white(*_read(path))
+
+
+def read_style(path: Path) -> FloatArray:
+    """Read a picture to learn from: like `read_image`, and there is something in it to learn.
+
+    Raises:
+        FileFormatError: If it is transparent, a single colour or tiny; and as `read_image` says.
+        BackendUnavailableError: If the package that the format needs is not installed.
+    """
+    colour, alpha = _read(path)
+    rows, columns = colour.shape[:2]
+    if min(rows, columns) < _SMALLEST_STYLE:
         raise FileFormatError(
-            f"{path}: expected a picture (PNG, JPEG, WebP, TIFF), found something else"
-        ) from error
-    except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
-        raise FileFormatError(
-            f"{path}: the picture has more than {Image.MAX_IMAGE_PIXELS} pixels; scale it down"
-        ) from error
-    except MemoryError:
-        raise
-    except Exception as error:  # Decoders raise whatever a damaged file makes them trip over.
-        raise FileFormatError(f"{path}: the picture is damaged ({error})") from error
+            f"{path}: the picture has {columns}×{rows} pixels; to learn from it, "
+            f"{_SMALLEST_STYLE}×{_SMALLEST_STYLE} are the least"
+        )
+    if alpha is not None and not alpha.any():
+        raise FileFormatError(f"{path}: the picture is fully transparent; nothing can be learned")
+    shown = _over_white(colour, alpha)
+    least, greatest = (linear_to_srgb(end) for end in (shown.min((0, 1)), shown.max((0, 1))))
+    if (greatest - least).max() < 1.5 / 255:
+        raise FileFormatError(f"{path}: the picture is a single colour; nothing can be learned")
+    return shown
+
+
+def kind_of(data: bytes) -> str:
+    """What a file seems to be that is no picture we read, in words."""
+    return next((kind for start, kind in _KINDS if re.match(start, data, re.DOTALL)),
+                "something else")  # fmt: skip
 
 
 def write_image(path: Path, image: AnyArray) -> None:
@@ -90,7 +132,7 @@ def write_image(path: Path, image: AnyArray) -> None:
     if image.ndim != 3 or image.shape[2] not in (3, 4) or 0 in image.shape:
         raise ShapeError(f"{path}: expected a picture [row, column, 3 or 4], got {image.shape}")
     if suffix == ".exr":
-        _write_exr(path, image)
+        write_exr(path, image)
         return
     name, options = _ENCODERS[suffix]
     pixels = _straight(image, opaque=name == "JPEG")
@@ -135,20 +177,105 @@ def fit(image: AnyArray, rows: int, columns: int) -> FloatArray:
     )
 
 
-def _linear_rgb(image: Image.Image) -> FloatArray:
+def _read(path: Path) -> tuple[FloatArray, FloatArray | None]:
+    """Premultiplied linear RGB `[row, column, 3]`, and opacity `[row, column, 1]` if there is."""
+    path = existing_file(path)
+    # From memory: Pillow asks a file for as many bytes as a chunk says it has, and Python makes
+    # room for them all before it reads.
+    data = path.read_bytes()
+    try:
+        with _quiet():
+            return _decoded(path, data)
+    except Image.UnidentifiedImageError as error:
+        raise FileFormatError(
+            f"{path}: expected a picture ({_READ}), found {kind_of(data)}"
+        ) from error
+    except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
+        raise FileFormatError(
+            f"{path}: the picture has more than {Image.MAX_IMAGE_PIXELS} pixels; scale it down"
+        ) from error
+    except (VncaError, MemoryError):
+        raise
+    except Exception as error:  # Decoders raise whatever a damaged file makes them trip over.
+        raise FileFormatError(f"{path}: the picture is damaged ({error})") from error
+
+
+def _decoded(path: Path, data: bytes) -> tuple[FloatArray, FloatArray | None]:
+    most = Image.MAX_IMAGE_PIXELS or 2**63
+    if data.startswith(exr.MAGIC):
+        colour, alpha = exr.read_exr(path, most)
+        if alpha is not None:
+            alpha = np.clip(np.nan_to_num(alpha, nan=0.0), 0, 1)
+        return _exposed(path, colour), alpha
+    if data.startswith(hdr.MAGICS):
+        return _exposed(path, hdr.read_hdr(path, data, most)), None
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Image.DecompressionBombWarning)
+        warnings.filterwarnings("ignore", category=UserWarning, module="PIL")
+        with Image.open(BytesIO(data), formats=_formats(path, data)) as image:
+            return _linear(path, ImageOps.exif_transpose(image))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep decoders from printing what they find wrong: a line of ours says it.
+
+    libtiff and OpenEXR do so past `sys.stderr`, so the file descriptor itself is led away.
+    """
+    sys.stderr.flush()
+    nowhere, kept = os.open(os.devnull, os.O_WRONLY), os.dup(2)
+    try:
+        os.dup2(nowhere, 2)
+        with redirect_stdout(StringIO()):
+            yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def _formats(path: Path, data: bytes) -> tuple[str, ...]:
+    # Older files of this kind can be told by nothing but their names.
+    is_tga = data.endswith(_TGA_END) or path.suffix.lower() == ".tga"
+    return (*FORMATS, "TGA") if is_tga else FORMATS
+
+
+def _over_white(colour: FloatArray, alpha: FloatArray | None) -> FloatArray:
+    if alpha is None:
+        return colour
+    return np.clip(colour + (1 - alpha), 0, 1).astype(np.float32, copy=False)
+
+
+def _exposed(path: Path, light: FloatArray) -> FloatArray:
+    """Scene-linear RGB as a viewer shows it.
+
+    Raises:
+        FileFormatError: If too little would be left of it.
+    """
+    light = np.nan_to_num(light, nan=0.0)
+    glare = np.mean(luminance(light) > _GLARING)
+    if glare > 0.5:
+        raise FileFormatError(
+            f"{path}: {glare:.0%} of its pixels are more than {_GLARING:g} times as bright as "
+            "white; lower its exposure first"
+        )
+    return np.clip(light, 0, 1)
+
+
+def _linear(path: Path, image: Image.Image) -> tuple[FloatArray, FloatArray | None]:
     if image.mode == "F":
-        return np.stack([np.asarray(image, np.float32)] * 3, axis=-1)
+        return _exposed(path, np.stack([np.asarray(image, np.float32)] * 3, axis=-1)), None
     if image.mode.startswith("I"):  # 16 bits of grey; Pillow widens some of them to 32.
-        grey = srgb_to_linear(np.asarray(image).astype(np.float32) / 65535)
-        return np.stack([grey] * 3, axis=-1)
+        grey = srgb_to_linear(np.clip(np.asarray(image).astype(np.float32) / 65535, 0, 1))
+        return np.stack([grey] * 3, axis=-1), None
     pixels = np.asarray(_in_srgb(image).convert("RGBA"))
     # A table, because a large picture in floats several times over would fill the memory.
     linear = srgb_to_linear(np.arange(256, dtype=np.float32) / 255).astype(np.float32)
     colour = linear[pixels[..., :3]]
     if (pixels[..., 3] == 255).all():
-        return colour
-    alpha = pixels[..., 3:].astype(np.float32) / 255
-    return (colour * alpha + (1 - alpha)).astype(np.float32, copy=False)
+        return colour, None
+    alpha = np.divide(pixels[..., 3:], 255, dtype=np.float32)
+    return colour * alpha, alpha
 
 
 def _in_srgb(image: Image.Image) -> Image.Image:
@@ -176,17 +303,3 @@ def _straight(image: AnyArray, *, opaque: bool) -> NDArray[np.uint8]:
         return to_srgb8(colour + (1 - alpha))
     colour = to_srgb8(colour / np.where(alpha > 0, alpha, 1))
     return np.concatenate([colour, np.rint(alpha * 255).astype(np.uint8)], axis=-1)
-
-
-def _write_exr(path: Path, image: AnyArray) -> None:
-    try:
-        import OpenEXR
-    except ImportError as error:
-        raise BackendUnavailableError(
-            f"{path}: writing OpenEXR needs the OpenEXR package: pip install 'vnca[train]'"
-        ) from error
-    half = np.clip(image, -_LARGEST_HALF, _LARGEST_HALF).astype(np.float16)
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    names = "RGB" if image.shape[2] == 3 else "RGBA"
-    with whole_file(path) as temporary:
-        OpenEXR.File(header, {names: np.ascontiguousarray(half)}).write(str(temporary))

@@ -1,20 +1,33 @@
 """Triangle meshes: what there is to texture in a file.
 
-Every mesh is a GLB document, OBJ, PLY and STL after a conversion by trimesh. So all that a GLB
-file holds stays in it: nodes, materials, animations, further UV sets.
+Every mesh is a GLB document, OBJ, PLY and STL after a conversion. So all that a GLB file holds
+stays in it: nodes, materials, animations, further UV sets.
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
-from vnca.errors import BackendUnavailableError, FileFormatError, GridError, OptionError
+from vnca.errors import (
+    BackendUnavailableError,
+    FileFormatError,
+    GridError,
+    OptionError,
+    VncaError,
+)
 from vnca.files import existing_file
+from vnca.io.draco import decompress
 from vnca.io.glb import DAMAGE, Glb
+from vnca.io.image import FORMATS
+from vnca.io.obj import plain_obj
 from vnca.io.orientation import UpAxis
+from vnca.io.ply import PlyMesh, parse_ply
 from vnca.typing import AnyArray
 
 SUFFIXES = (".glb", ".obj", ".ply", ".stl")
@@ -95,6 +108,7 @@ def read_mesh(path: Path, up: UpAxis | None = None) -> Mesh:
         if up != "y":
             raise OptionError(f"--up-axis {up}: {path} is a GLB file, where up is always y")
         glb = Glb.read(path)
+        decompress(glb)
     else:
         glb = _converted(path, up)
     try:
@@ -129,15 +143,12 @@ def trimesh_for(path: Path) -> Any:
 
 
 def _converted(path: Path, up: UpAxis) -> Glb:
-    """The GLB document of a file that trimesh reads."""
+    """The GLB document of a file of another format."""
     trimesh = trimesh_for(path)
     try:
         # What single precision cannot hold becomes infinite, and is refused as such.
-        with path.open("rb") as file, np.errstate(over="ignore"):
-            scene = trimesh.load_scene(
-                file, path.suffix[1:].lower(), process=False,
-                resolver=trimesh.resolvers.FilePathResolver(str(path)),
-            )  # fmt: skip
+        with np.errstate(over="ignore", invalid="ignore"):
+            scene = _scene(path, trimesh)
             shapes = [s for s in scene.geometry.values() if isinstance(s, trimesh.Trimesh)]
             if not any(len(shape.faces) for shape in shapes):
                 raise GridError(f"{path}: there are no triangles in it to texture")
@@ -149,9 +160,7 @@ def _converted(path: Path, up: UpAxis) -> Glb:
                 if path.suffix.lower() == ".stl":  # Each of its triangles has vertices of its own.
                     shape.merge_vertices()
             glb = Glb.parse(scene.export(file_type="glb"), path)
-    except GridError:
-        raise
-    except MemoryError:
+    except (VncaError, MemoryError):
         raise
     except Exception as error:  # Parsers raise whatever a damaged file makes them trip over.
         raise FileFormatError(f"{path}: the mesh is damaged ({error})") from error
@@ -162,6 +171,32 @@ def _converted(path: Path, up: UpAxis) -> Glb:
             )
             scene["nodes"] = [len(glb.items("nodes")) - 1]
     return glb
+
+
+def _scene(path: Path, trimesh: Any) -> Any:
+    """The scene of a file that is not GLB, all its polygons triangles."""
+    data, kind = path.read_bytes(), path.suffix[1:].lower()
+    resolver = trimesh.resolvers.FilePathResolver(str(path))
+    if kind == "ply":
+        return trimesh.Scene({path.name: _ply_shape(parse_ply(data), resolver, trimesh)})
+    if kind == "obj":
+        data = plain_obj(data)
+    return trimesh.load_scene(BytesIO(data), kind, process=False, resolver=resolver)
+
+
+def _ply_shape(ply: PlyMesh, resolver: Any, trimesh: Any) -> Any:
+    shape = trimesh.Trimesh(
+        ply.points, ply.faces, vertex_normals=ply.normals, vertex_colors=ply.colours, process=False
+    )
+    if ply.uv is not None:
+        picture = None
+        if ply.picture is not None:
+            # Without it the mesh can be textured all the same.
+            with suppress(Exception):
+                picture = Image.open(BytesIO(resolver.get(ply.picture)), formats=FORMATS)
+        material = trimesh.visual.material.PBRMaterial(baseColorTexture=picture)
+        shape.visual = trimesh.visual.TextureVisuals(uv=ply.uv, material=material)
+    return shape
 
 
 def _surfaces(glb: Glb) -> Iterator[Surface]:

@@ -13,7 +13,7 @@ from vnca.colour import srgb_to_linear
 from vnca.errors import FileFormatError
 from vnca.files import whole_file
 from vnca.io.glb import DAMAGE, Glb
-from vnca.io.image import FORMATS
+from vnca.io.image import FORMATS, kind_of
 from vnca.io.mesh import TO_OURS, TRIANGLES, Mesh, Surface, trimesh_for
 from vnca.typing import AnyArray, FloatArray
 
@@ -182,20 +182,38 @@ def _base_colour(glb: Glb, surface: Surface, pictures: dict[int, FloatArray]) ->
     texture = shading.get("baseColorTexture")
     if texture is None:
         return BaseColour(np.zeros((len(surface.points), 2)), factor.reshape(1, 1, 3), True)
-    uv = glb.array(surface.primitive["attributes"][f"TEXCOORD_{texture.get('texCoord', 0)}"])
+    transform = texture.get("extensions", {}).get("KHR_texture_transform", {})
+    uv_set = transform.get("texCoord", texture.get("texCoord", 0))
+    uv = _moved(glb.array(surface.primitive["attributes"][f"TEXCOORD_{uv_set}"]), transform)
     entry = glb.item("textures", texture["index"])
-    source = entry["source"]
+    # Extensions name pictures of other formats, which may stand beside a usual one.
+    sources = [entry, *entry.get("extensions", {}).values()]
+    source = next((each for each in sources if "source" in each), entry)["source"]
     if source not in pictures:
-        view = glb.item("images", source)["bufferView"]
-        pictures[source] = _decoded(glb, glb.bytes_of(view))
+        pictures[source] = _decoded(glb, glb.picture(source))
     sampler = glb.item("samplers", entry["sampler"]) if "sampler" in entry else {}
     return BaseColour(uv, pictures[source] * factor, sampler.get("wrapS") != _CLAMPED)
+
+
+def _moved(uv: AnyArray, transform: dict[str, Any]) -> AnyArray:
+    """UVs where a texture's transform puts them.
+
+    Reference: Khronos, glTF extension KHR_texture_transform.
+    """
+    turn = float(transform.get("rotation", 0.0))
+    c, s = np.cos(turn), np.sin(turn)
+    scaled = uv * np.asarray(transform.get("scale", (1.0, 1.0)), np.float64)
+    return scaled @ np.array([[c, -s], [s, c]]) + transform.get("offset", (0.0, 0.0))
 
 
 def _decoded(glb: Glb, data: bytes) -> FloatArray:
     try:
         with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             pixels = np.asarray(image.convert("RGB"))
+    except Image.UnidentifiedImageError as error:
+        raise FileFormatError(
+            f"{glb.path}: a picture in it is of a kind that is not read ({kind_of(data)})"
+        ) from error
     except Exception as error:  # Decoders raise whatever a damaged file makes them trip over.
         raise FileFormatError(f"{glb.path}: a picture in it is damaged ({error})") from error
     return srgb_to_linear(pixels.astype(np.float32) / 255)

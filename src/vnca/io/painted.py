@@ -1,6 +1,6 @@
 """Writing smoke as VDB files: painted frames of a sequence, and simulated ones."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,8 +11,9 @@ from vnca.bricks.refinement import divided
 from vnca.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.io.npz import read_npz_smoke
 from vnca.io.orientation import UpAxis, on_lattice, own_cells, upright_world
+from vnca.io.provenance import Provenance, without_provenance
 from vnca.io.smoke_format import CELLS_PER_FRAME, UNITS_METADATA, SmokeFormat, up_axis_of
-from vnca.io.vdb import VALUE_TYPES, Grid, GridHeader, Transform, open_vdb, write_vdb
+from vnca.io.vdb import VALUE_TYPES, Entry, Grid, GridHeader, Transform, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
 from vnca.lattice import Lattice, Placement
@@ -39,6 +40,7 @@ def write_painted(
     lattice: Lattice | None = None,
     colour_grids: Sequence[str] = COLOUR_GRIDS,
     refine: int = 1,
+    provenance: Provenance | None = None,
 ) -> None:
     """Write a frame of a sequence with new density and colour as a VDB file.
 
@@ -61,6 +63,7 @@ def write_painted(
             unless given.
         colour_grids: Names of the colour grids, several to have the colour several times.
         refine: How many times as fine as the source's the painted cells are along each axis.
+        provenance: What the file's metadata is to tell of the painting.
 
     Raises:
         OptionError: If a colour grid is named like the density, or two are named alike.
@@ -83,7 +86,7 @@ def write_painted(
         colour = Field.from_dense(colour, box.lower)
     frame = _Painting(density, colour, lattice, up_axis_of(source, format), refine)
     write = _paint_npz if source.suffix.lower() == ".npz" else _paint_vdb
-    write(path, source, format, frame, colour_grids)
+    write(path, source, format, frame, colour_grids, provenance.metadata if provenance else {})
 
 
 def write_smoke(path: Path, volume: Volume) -> None:
@@ -223,7 +226,12 @@ class _Painting:
 
 
 def _paint_vdb(
-    path: Path, source: Path, format: SmokeFormat, frame: _Painting, colour_grids: Sequence[str]
+    path: Path,
+    source: Path,
+    format: SmokeFormat,
+    frame: _Painting,
+    colour_grids: Sequence[str],
+    told: Mapping[str, Entry],
 ) -> None:
     with open_vdb(source) as file:
         if not file.grids:
@@ -262,11 +270,16 @@ def _paint_vdb(
             )
             for name in colour_grids
         ]
-        write_vdb(path, grids, metadata=file.metadata)
+        write_vdb(path, grids, metadata={**without_provenance(file.metadata), **told})
 
 
 def _paint_npz(
-    path: Path, source: Path, format: SmokeFormat, frame: _Painting, colour_grids: Sequence[str]
+    path: Path,
+    source: Path,
+    format: SmokeFormat,
+    frame: _Painting,
+    colour_grids: Sequence[str],
+    told: Mapping[str, Entry],
 ) -> None:
     stored = read_npz_smoke(source, format)
     transform = Transform.from_matrix(stored.index_to_world)
@@ -296,7 +309,7 @@ def _paint_npz(
                 grid_class="staggered" if all(velocity.staggered) else None,
             )
         )
-    write_vdb(path, grids)
+    write_vdb(path, grids, metadata=told)
 
 
 def _require_vdb(path: Path) -> None:

@@ -32,6 +32,7 @@ __all__ = [
     "missing_velocity",
     "read_smoke",
     "smoke_box",
+    "smoke_extent",
     "with_fitted_scale",
     "write_painted",
     "write_smoke",

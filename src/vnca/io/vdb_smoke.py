@@ -126,6 +126,11 @@ def _read_velocity(
     file: VdbFile, format: SmokeFormat, density: Field, place: Transform
 ) -> StoredVelocity | None:
     headers = velocity_headers(file, format)
+    if not headers and file.unfound and format.velocity_grid is None:
+        raise GridError(
+            f"{file.path}: no velocity among {file.listed()}; write the file again with offsets, "
+            "or leave the velocity out with --velocity-grid none"
+        )
     if not headers:
         return None
     for header in headers:

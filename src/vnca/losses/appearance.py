@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from math import inf
+from typing import Literal, NamedTuple
 
 import torch
 from jaxtyping import Float, Int
@@ -10,7 +11,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from vnca.errors import OptionError, ShapeError
-from vnca.features.vgg import STYLE_LAYERS, VGG16
+from vnca.features.network import FeatureNetwork
+from vnca.features.strokes import picture_cells
 from vnca.losses.moments import Moments, moment_distance, moments
 from vnca.losses.pixels import luminance, palette_distance
 from vnca.losses.style import sample_positions, style_distance
@@ -22,8 +24,9 @@ from vnca.typing import FloatArray
 class AppearanceConfig:
     """What is compared between a picture and the style image, and how strongly."""
 
-    layers: tuple[str, ...] = STYLE_LAYERS
-    """Layers of VGG16 to compare, `reluB_I`."""
+    layers: tuple[str, ...] = ()
+    """Layers of the network to compare: its own choice unless given. EfficientNet has stem and
+    blockN, VGG reluB_I."""
     style: float = 1.0
     """Weight of style matching; 0 leaves it out."""
     moments: float = 1.0
@@ -33,11 +36,15 @@ class AppearanceConfig:
     colour: bool = True
     """Compare the pictures in colour."""
     grey: bool = True
-    """Compare the pictures in grey, which shapes the density."""
+    """Compare the pictures in grey, too."""
+    grey_source: Literal["luma", "density"] = "luma"
+    """What is seen in grey: the luma of the coloured view, which colour alone can satisfy, or as in
+    the paper the density, I = Σ d τ, which nothing but a change of the density can."""
     samples: int = 1024
     """Positions drawn in each layer for style matching, from either picture."""
-    style_scale: float = 1.0
-    """Shorter side of the style image relative to the view: below 1 shrinks the brush strokes."""
+    style_scale: float | None = None
+    """Shorter side of the style image relative to the view: below 1 shrinks the brush strokes.
+    Chosen so that a stroke of the picture spans three cells unless given."""
     opacity_threshold: float = 0.6
     """Compare only where the smoke is at least this opaque."""
 
@@ -49,8 +56,6 @@ class AppearanceConfig:
                 )
         if not (self.colour or self.grey):
             raise OptionError("--appearance.colour, --appearance.grey: at least one is needed")
-        if not self.layers:
-            raise OptionError("--appearance.layers: at least one is needed")
         if self.samples < 1:
             raise OptionError(f"--appearance.samples {self.samples}: must be at least 1")
         if not 0 <= self.opacity_threshold < 1:
@@ -58,8 +63,18 @@ class AppearanceConfig:
                 f"--appearance.opacity-threshold {self.opacity_threshold}: must be at least 0 "
                 "and below 1"
             )
-        if self.style_scale <= 0:
+        if self.grey_source == "density" and not self.grey:
+            raise OptionError(
+                "--appearance.grey-source density: nothing is compared in grey; "
+                "add --appearance.grey"
+            )
+        if self.style_scale is not None and not 0 < self.style_scale < inf:
             raise OptionError(f"--appearance.style-scale {self.style_scale}: must be positive")
+
+    @property
+    def shows_density(self) -> bool:
+        """Whether pictures of the density itself are compared."""
+        return self.grey and self.grey_source == "density"
 
 
 class Appearance(NamedTuple):
@@ -78,16 +93,17 @@ class _Layer(NamedTuple):
 
 
 class AppearanceLoss:
-    """Distance between pictures and one style image, over several layers of VGG16.
+    """Distance between pictures and one style image, over several layers of a network.
 
     Each layer's features are divided by the root mean square of the style image's, in colour
     and in grey. Cosines do not notice; means and covariances, which the paper compares as
-    they are, then weigh alike in all layers and for all weights of VGG16. Unscaled, they
-    differ by orders of magnitude: one set of weights takes input in ±2, another in ±128.
+    they are, then weigh alike in all layers and for all networks. Unscaled, they differ by
+    orders of magnitude: one takes input in ±2, another in ±128.
 
     Attributes:
         background: Mean colour of the style image, linear RGB `[3]`. Pictures are best
             composited over it, so that thin smoke does not read as black paint.
+        style_scale: Shorter side of the style image relative to the views, given or chosen.
 
     Reference: the VNCA paper's L_app; Kolkin, Salavon and Shakhnarovich 2019.
     """
@@ -101,27 +117,36 @@ class AppearanceLoss:
     _seed = 0
 
     def __init__(
-        self, vgg: VGG16, style_image: FloatArray, config: AppearanceConfig, size: int
+        self,
+        network: FeatureNetwork,
+        style_image: FloatArray,
+        config: AppearanceConfig,
+        size: int,
+        cells: float | None = None,
     ) -> None:
         """Prepare the style image.
 
         Args:
-            vgg: The frozen network; its device is the device of the loss.
+            network: Its device is the device of the loss.
             style_image: Linear RGB `[r, c, 3]`.
             config: What is compared.
             size: Shorter side of the views, pixels.
+            cells: The same in cells, to choose the scale of the style image by; a cell a pixel
+                unless given.
 
         Raises:
+            OptionError: If a layer does not exist.
             ShapeError: If the image is not `[r, c, 3]`.
         """
         if style_image.ndim != 3 or style_image.shape[2] != 3:
             raise ShapeError(f"style image: expected [r, c, 3], got {style_image.shape}")
         self.config = config
-        self._vgg = vgg
-        linear = torch.tensor(style_image, dtype=torch.float32, device=vgg.mean.device)
+        self._network = network
+        self.style_scale = config.style_scale or style_scale(style_image, size, cells)
+        linear = torch.tensor(style_image, dtype=torch.float32, device=network.device)
         linear = linear.permute(2, 0, 1)[None]
         self.background = linear.mean((0, 2, 3))
-        shorter = max(32, round(size * config.style_scale))
+        shorter = max(32, round(size * self.style_scale))
         self._generator = torch.Generator().manual_seed(self._seed)
         with torch.no_grad():
             picture = linear_to_srgb(_resized(linear, shorter).clamp(0, 1))
@@ -135,20 +160,27 @@ class AppearanceLoss:
         picture: Float[Tensor, "b 3 r c"],
         opacity: Float[Tensor, "b r c"],
         generator: torch.Generator,
+        grey: Float[Tensor, "b 3 r c"] | None = None,
     ) -> Appearance:
         """Mean over the pictures of the summed distances over the layers.
 
-        Differentiable in `picture`; `opacity` only chooses positions. A picture without smoke
-        contributes zero.
+        Differentiable in `picture` and `grey`; `opacity` only chooses positions. A picture without
+        smoke contributes zero.
 
         Args:
             picture: sRGB in 0–1.
             opacity: 0–1.
             generator: Draws the positions.
+            grey: What is compared in grey, sRGB in 0–1 with equal channels; the luma of `picture`
+                unless given.
 
         Raises:
-            ShapeError: If picture and opacity differ in size.
+            ShapeError: If picture, opacity and grey differ in size.
         """
+        if grey is not None and grey.shape != picture.shape:
+            raise ShapeError(
+                f"grey: expected {tuple(picture.shape)} like the picture, got {tuple(grey.shape)}"
+            )
         if opacity.shape != (picture.shape[0], *picture.shape[2:]):
             raise ShapeError(
                 f"opacity: expected {(picture.shape[0], *picture.shape[2:])} to match the "
@@ -165,7 +197,7 @@ class AppearanceLoss:
                 )
                 terms["pixels"] = terms["pixels"] + palettes
         if config.style or config.moments:
-            for ours, style in self._compared(picture, opacity):
+            for ours, style in self._compared(picture, grey, opacity):
                 if config.moments:
                     distance = moment_distance(moments(ours), style.moments)
                     terms["moments"] = terms["moments"] + distance
@@ -179,10 +211,10 @@ class AppearanceLoss:
         return Appearance(torch.stack(list(terms.values())).sum(), terms)
 
     def _compared(
-        self, picture: Tensor, opacity: Tensor
+        self, picture: Tensor, grey: Tensor | None, opacity: Tensor
     ) -> Iterator[tuple[Float[Tensor, "_ _"], _Layer]]:
         """Feature sets of the smoke, each with the style's counterpart."""
-        for maps, styles in zip(self._features(picture), self._layers, strict=True):
+        for maps, styles in zip(self._features(picture, grey), self._layers, strict=True):
             chosen = self._chosen(opacity, maps[0])
             for kind, style in zip(maps, styles, strict=True):
                 for features in self._shown(kind, chosen):
@@ -192,10 +224,11 @@ class AppearanceLoss:
         count, device = len(features), features.device
         return features[sample_positions(count, self.config.samples, generator, device)]
 
-    def _features(self, picture: Tensor) -> list[list[Tensor]]:
+    def _features(self, picture: Tensor, grey: Tensor | None = None) -> list[list[Tensor]]:
         """Per layer, the maps of the picture in colour, in grey, or both."""
-        kinds = [picture] * self.config.colour + [luminance(picture)] * self.config.grey
-        maps = self._vgg.features(torch.cat(kinds), self.config.layers)
+        grey = luminance(picture) if grey is None else grey
+        kinds = [picture] * self.config.colour + [grey] * self.config.grey
+        maps = self._network.features(torch.cat(kinds), self.config.layers or None)
         return [list(layer.split(len(picture))) for layer in maps]
 
     def _described(self, maps: Tensor) -> _Layer:
@@ -229,6 +262,18 @@ class AppearanceLoss:
         for features, where in zip(_positions(maps), chosen, strict=True):
             if len(where):
                 yield features[where]
+
+
+def style_scale(style_image: FloatArray, size: int, cells: float | None = None) -> float:
+    """Shorter side of a style image relative to views, for its strokes to span some cells.
+
+    Args:
+        style_image: Linear RGB `[r, c, 3]`.
+        size: Shorter side of the views, pixels.
+        cells: The same in cells; a cell a pixel unless given.
+    """
+    cells = float(size) if cells is None else cells
+    return picture_cells(style_image, cells, size) / cells
 
 
 def _positions(maps: Float[Tensor, "b c r k"]) -> Float[Tensor, "b n c"]:

@@ -61,9 +61,9 @@ def march(
     Args:
         density: `[x, y, z]`.
         origins: `[rays, 3]`, cell coordinates.
-        directions: `[rays, 3]`, unit vectors.
+        directions: `[rays, 3]`, cells for each length of depth, of any length.
         near: Depth before which nothing is sampled.
-        step: Cells between samples.
+        step: Depth between samples.
         offset: Where the samples begin, in steps, in [0, 1).
     """
     smoke = density > 0

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -15,6 +16,7 @@ from vnca.render.composite import gather, ray_weights
 from vnca.render.march import march
 from vnca.render.paper import paper_weights
 from vnca.render.sample import sample
+from vnca.typing import AnyArray
 
 Mode = Literal["sane", "paper"]
 
@@ -29,8 +31,8 @@ class View:
     Attributes:
         colour: `[rows, columns, 3]`, linear RGB, premultiplied by opacity.
         opacity: `[rows, columns]`, in [0, 1].
-        depth: `[rows, columns]`, mean depth of the smoke seen, cells along the ray; infinite
-            where there is none.
+        depth: `[rows, columns]`, mean depth along the ray of the smoke seen, in the camera's
+            lengths; infinite where there is none.
     """
 
     colour: Float[Tensor, "rows columns 3"]
@@ -59,6 +61,7 @@ def render(
     step: float = 1.0,
     offset: float = 0.0,
     mode: Mode = "sane",
+    cells_to_world: AnyArray | None = None,
 ) -> View:
     """Render smoke by emission and absorption.
 
@@ -68,16 +71,22 @@ def render(
     Density and density times colour are interpolated, and the colour of a sample is their
     quotient: so what colour the empty cells around the smoke have is of no effect.
 
+    Lengths are those of the space the camera is in, whatever the shape of the cells: what a slab
+    of smoke absorbs depends on how thick it is there, not on how many cells it is divided into.
+
     Args:
         density: max(d (1 + Δd), 0), non-negative.
         colour: Linear RGB.
-        camera: Where to look from, in cell coordinates of these arrays.
+        camera: Where to look from, in the space that `cells_to_world` leads to.
         rows: Height of the picture, pixels.
         columns: Width of the picture, pixels.
-        gamma: Extinction of density one, 1/cell.
-        step: Cells between samples along a ray; one in paper mode.
+        gamma: Extinction of density one, 1/length.
+        step: Length between samples along a ray; one in paper mode.
         offset: Shift of all samples along their rays, in steps, in [0, 1). Training draws it.
         mode: "sane" for the emission–absorption integral, "paper" for the paper's integrand.
+        cells_to_world: 4×4, affine and invertible, from cell coordinates of these arrays (cell
+            `[i, j, k]` at (i, j, k)) to where the camera is. The same unless given: lengths are
+            then in cells.
 
     Raises:
         ShapeError: If density and colour do not cover the same cells.
@@ -85,7 +94,8 @@ def render(
     """
     _check(density, colour, rows, columns, gamma, step, offset, mode)
     origins, directions = (
-        torch.from_numpy(array).to(density).view(-1, 3) for array in camera.rays(rows, columns)
+        density.new_tensor(array).view(-1, 3)
+        for array in _through_cells(*camera.rays(rows, columns), cells_to_world)
     )
     field = torch.cat([density[..., None], density[..., None] * colour], dim=-1)
     pixels, colours, opacities, depths = [], [], [], []
@@ -106,6 +116,16 @@ def render(
         _picture(pixels, opacities, density.new_zeros(rows * columns)).view(rows, columns),
         _picture(pixels, depths, density.new_full((rows * columns,), math.inf)).view(rows, columns),
     )
+
+
+def _through_cells(
+    origins: AnyArray, directions: AnyArray, cells_to_world: AnyArray | None
+) -> tuple[AnyArray, AnyArray]:
+    """Rays `point = origin + depth · direction` of the world, in cells; depths stay as they are."""
+    if cells_to_world is None:
+        return origins, directions
+    to_cells = np.linalg.inv(cells_to_world[:3, :3])
+    return (origins - cells_to_world[:3, 3]) @ to_cells.T, directions @ to_cells.T
 
 
 def _mean_depth(weights: Tensor, depth: Tensor) -> Tensor:
@@ -141,7 +161,7 @@ def _check(
     if not gamma >= 0:
         raise OptionError(f"gamma: expected 0 or more, got {gamma}")
     if not step > 0:
-        raise OptionError(f"step: expected more than 0 cells, got {step}")
+        raise OptionError(f"step: expected more than 0, got {step}")
     if not 0 <= offset < 1:
         raise OptionError(f"offset: expected 0 to less than 1, got {offset}")
     if mode not in ("sane", "paper"):

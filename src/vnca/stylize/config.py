@@ -11,7 +11,8 @@ class StylizeConfig:
     """How a rule is rolled over a sequence, and how strongly it shows."""
 
     steps_per_frame: int | None = None
-    """Steps of the automaton between two frames; as many as in training unless given."""
+    """Steps of the automaton between two frames; as many as in training unless given. On a grid K
+    times as fine they are K times as many, given or not."""
     warmup: int = 64
     """Steps on the first frame before it is painted."""
     domain: DomainKind | None = None

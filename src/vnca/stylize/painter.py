@@ -10,9 +10,10 @@ from typing import Any, Literal, NamedTuple
 
 from vnca.errors import FileFormatError, GridError, OptionError, OutputError, ShapeError, VncaError
 from vnca.files import existing_file, remove_file, remove_leftovers
+from vnca.io.provenance import Provenance
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke import SmokeFormat, missing_velocity, read_smoke, write_painted
-from vnca.io.smoke_format import NO_VELOCITY
+from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.lattice import Lattice
 from vnca.stylize.ahead import read_ahead
 from vnca.stylize.roll import Roll, RollState
@@ -54,6 +55,7 @@ class Painter:
         tell: Is given lines for the user.
         refine: How many times as fine as the smoke's the grid of the painting is; what the roll
             paints is refined smoke.
+        facts: What else files tell of their painting, beside how opaque it is to be seen.
     """
 
     sequence: FrameSequence
@@ -66,6 +68,7 @@ class Painter:
     conditions: Mapping[str, Any]
     tell: Callable[[str], None]
     refine: int = 1
+    facts: Mapping[str, str | int | float] = field(default_factory=dict)
     _told: set[str] = field(default_factory=set, init=False)
 
     @property
@@ -169,6 +172,7 @@ class Painter:
             lattice=self.lattice,
             colour_grids=self.colour_grids,
             refine=self.refine,
+            provenance=self._provenance(read),
         )
         return painting.state
 
@@ -184,6 +188,16 @@ class Painter:
             self._told.add("velocity")
             missing = missing_velocity(read.frame.path)
             self.tell(f"{missing}; frames without are painted as if their smoke rested")
+
+    def _provenance(self, read: _Read) -> Provenance:
+        """What the painting of a frame tells of itself."""
+        scales = self.roll.rule.scales
+        return Provenance(
+            scales.extinction(read.smoke.cell_length),
+            scales.gamma * self.refine,
+            up_axis_of(read.frame.path, self.smoke),
+            self.facts,
+        )
 
     def _read(self, at: int) -> _Read | VncaError:
         """A frame of the sequence, or what is wrong with it."""

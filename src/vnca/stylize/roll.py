@@ -128,9 +128,12 @@ class Roll:
 
     def refined(self, factor: int) -> "Roll":
         """The same on a grid `factor` times as fine along each axis, for smoke refined alike."""
+        asked = self.config.steps_per_frame
+        steps = None if asked is None else factor * asked
         return replace(
             self,
             rule=self.rule.refined(factor),
+            config=replace(self.config, steps_per_frame=steps),
             box=self.box.refined(factor),
             fringe=self.fringe * factor,
         )

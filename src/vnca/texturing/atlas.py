@@ -16,8 +16,12 @@ Unwrap: TypeAlias = Literal["auto", "always", "never"]
 
 GUTTER = 4
 """Texels around a chart that go on with its surface: filters read them."""
-OVERLAP = 0.01
-"""Share of the texels that two faces may share before UVs count as overlapping."""
+WRONG = 1e-3
+"""Share of the texels that two faces may share, and of the surface that may have none, before UVs
+count as unusable: about what a patch takes of which one can tell the colour."""
+SPARSE = 1e-3
+"""Share of its fair part of the texture below which a face counts as having none, and of the whole
+texture below which a mesh does: nothing but a few texels' colours would be seen."""
 _NOBODY = -1
 # A texel of the gutter goes on with the plane of its face, but not to the ends of the world.
 _FARTHEST = 8.0
@@ -40,28 +44,45 @@ class TexelMap:
     overlap: float
 
 
-def unwrapped(mesh: Mesh, unwrap: Unwrap, *, size: int) -> tuple[list[Unwrapping], TexelMap]:
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """A mesh in one texture.
+
+    Attributes:
+        unwrappings: One a surface.
+        texels: Those that show it.
+        fault: Why UVs that were there are not used; None if they are, or were not asked for.
+    """
+
+    unwrappings: list[Unwrapping]
+    texels: TexelMap
+    fault: str | None = None
+
+
+def unwrapped(mesh: Mesh, unwrap: Unwrap, *, size: int) -> Atlas:
     """UVs for all surfaces of a mesh, in one texture, and the texels under them.
 
-    `auto` keeps UVs that are there if all of them fit into one texture and do not overlap;
-    `never` insists on them; `always` makes new ones.
+    `auto` keeps UVs that are there if all of them fit into one texture, do not overlap, and give
+    every face a place; `never` insists on them; `always` makes new ones.
 
     Raises:
         GridError: If the UVs there are cannot be used and have to be.
         BackendUnavailableError: If xatlas is needed and not installed.
     """
+    fault = None
     if unwrap != "always":
-        problem = _unusable(mesh.surfaces)
-        if problem is None:
+        fault = _unusable(mesh.surfaces)
+        if fault is None:
             kept = [Unwrapping(s.faces, s.uv) for s in mesh.surfaces if s.uv is not None]
             texels = texel_map(mesh.surfaces, kept, size)
-            if texels.overlap <= OVERLAP:
-                return kept, texels
-            problem = f"{texels.overlap:.0%} of the texels belong to several faces"
+            if texels.overlap <= WRONG:
+                return Atlas(kept, texels)
+            fault = f"{texels.overlap:.1%} of the texels belong to several faces"
         if unwrap == "never":
-            raise GridError(f"{mesh.glb.path}: its UVs cannot be used ({problem}); --unwrap always")
+            raise GridError(f"{mesh.glb.path}: its UVs cannot be used ({fault}); --unwrap always")
     made = _unwrap(mesh.surfaces, size)
-    return made, texel_map(mesh.surfaces, made, size)
+    had_some = any(surface.uv is not None for surface in mesh.surfaces)
+    return Atlas(made, texel_map(mesh.surfaces, made, size), fault if had_some else None)
 
 
 def texel_map(
@@ -106,7 +127,23 @@ def _unusable(surfaces: Sequence[Surface]) -> str | None:
         # A NaN fails the comparison too.
         if not (used.min() >= -1e-6 and used.max() <= 1 + 1e-6):
             return f"those of '{surface.name}' leave the texture"
+    uv = np.concatenate([s.uv[s.faces] for s in surfaces if s.uv is not None])
+    areas = np.concatenate([_areas(s.points[s.faces]) for s in surfaces])
+    given = _areas(uv)
+    if not given.sum() > SPARSE:
+        return f"they cover {given.sum():.2%} of the texture"
+    starved = given < SPARSE * given.sum() * areas / max(areas.sum(), np.finfo(float).tiny)
+    if areas[starved].sum() > WRONG * areas.sum():
+        return f"{starved.sum()} of {len(areas)} faces have next to no area in the texture"
     return None
+
+
+def _areas(triangles: AnyArray) -> AnyArray:
+    """Of `[f, 3, dimension]`, `[f]`."""
+    a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    if triangles.shape[-1] == 2:
+        return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+    return np.linalg.norm(np.cross(a, b), axis=1) / 2
 
 
 def _unwrap(surfaces: Sequence[Surface], size: int) -> list[Unwrapping]:

@@ -19,19 +19,19 @@ LARGEST_PICTURE = 128
 """Cells along the shorter side of the picture, at most: its patterns are to fit the block."""
 
 
-def beginning_config(config: TrainConfig, share: float, cells: float) -> TextureConfig | None:
+def beginning_config(config: TrainConfig, share: float, picture: float) -> TextureConfig | None:
     """How the texture is trained for a training on smoke, or None if it is not to be.
 
     Args:
         config: The training on smoke. The rule is as large, and the picture in cells too.
         share: Iterations for each of that training.
-        cells: Those across a view of the smoke.
+        picture: Cells along its shorter side, as the smoke is shown it.
     """
     iterations = round(share * config.iterations)
     if iterations == 0:
         return None
     plain = PRESETS["draft"]
-    picture = min(config.appearance.style_scale * cells, LARGEST_PICTURE)
+    picture = min(picture, LARGEST_PICTURE)
     return dataclasses.replace(
         plain,
         rule=dataclasses.replace(

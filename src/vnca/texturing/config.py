@@ -45,9 +45,8 @@ class SliceConfig:
 _PLAIN = RuleConfig(
     sobel_divisor=8, position_prior=False, density_prior=False, velocity_prior=False
 )
-# No density is to be shaped by a picture in grey. Slices are small, for speed; the picture is
-# larger, for its patterns to be as large as they can be in a block.
-_COLOURS = AppearanceConfig(grey=False, style_scale=1.5, samples=512)
+# No density is to be shaped by a picture in grey.
+_COLOURS = AppearanceConfig(grey=False, samples=512)
 
 
 @dataclass(frozen=True)
@@ -73,6 +72,8 @@ class TextureConfig(CourseConfig):
             raise OptionError(
                 "--position-prior, --density-prior, --velocity-prior: a solid texture has none"
             )
+        if self.appearance.shows_density:
+            raise OptionError("--appearance.grey-source density: a solid texture has no density")
         if not SMALLEST <= self.block <= LARGEST:
             raise OptionError(f"--block {self.block}: must be from {SMALLEST} to {LARGEST} cells")
 

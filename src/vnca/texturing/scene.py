@@ -88,7 +88,8 @@ class BlockScene(Scene[list[Cut]]):
             OptionError: If the size cannot work.
         """
         domain = block_domain(size)
-        super().__init__(domain, np.zeros((len(domain), PRIORS), np.float32), device)
+        nothing = np.zeros((len(domain), PRIORS), np.float32)
+        super().__init__(domain, nothing, device, width=float(slices.size))
         self.slices = slices
         self.views = mesh_views(mesh, slices.size) if mesh is not None else []
 

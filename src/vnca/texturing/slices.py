@@ -72,7 +72,7 @@ def slice_points(
     """Cell coordinates of the pixels of a slice."""
     x, y, z = (float(value) for value in middle)
     plane = Orthographic((x, y, z), *angles, height=size * spacing)
-    return torch.from_numpy(plane.rays(size, size)[0])
+    return torch.from_numpy(plane.rays(size, size)[0].astype(np.float32))
 
 
 def periodic(block: Float[Tensor, "x y z c"]) -> Float[Tensor, "_ _ _ c"]:

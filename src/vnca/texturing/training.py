@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from vnca.automaton.rule import Rule, Scales
-from vnca.features.vgg import VGG16
+from vnca.features.network import FeatureNetwork
 from vnca.io.mesh import Mesh
 from vnca.texturing.config import TextureConfig
 from vnca.texturing.scene import BlockScene
@@ -20,7 +20,7 @@ from vnca.typing import FloatArray
 def texture_trainer(
     style: FloatArray,
     config: TextureConfig,
-    vgg: VGG16,
+    network: FeatureNetwork,
     *,
     mesh: Mesh | None = None,
     device: torch.device | str = "cpu",
@@ -31,7 +31,7 @@ def texture_trainer(
     Args:
         style: Linear RGB `[r, c, 3]`.
         config: The hyperparameters.
-        vgg: The frozen network that judges pictures.
+        network: The frozen network that judges pictures.
         mesh: Looked at beside the slices.
         device: Where to compute.
         memory_budget: Bytes that the program may take; see `Trainer`.
@@ -41,7 +41,7 @@ def texture_trainer(
     """
     scene = BlockScene(config.block, config.slices, mesh=mesh, device=device)
     rule = initial_rule(config)
-    return Trainer(scene, rule, style, config, vgg, memory_budget=memory_budget)
+    return Trainer(scene, rule, style, config, network, memory_budget=memory_budget)
 
 
 def initial_rule(config: TextureConfig) -> Rule:

@@ -20,7 +20,7 @@ from torch import Tensor
 
 import vnca
 from vnca.errors import FileFormatError, OptionError, OutputError
-from vnca.features.vgg import VGG16
+from vnca.features.network import FeatureNetwork
 from vnca.files import existing_file, whole_file
 from vnca.training.course import CourseConfig
 from vnca.training.loop import Trainer
@@ -152,7 +152,7 @@ def _of_part(tensors: Mapping[str, Tensor], part: str) -> dict[str, Tensor]:
 def fingerprints(
     style: FloatArray,
     config: CourseConfig,
-    vgg: VGG16,
+    network: FeatureNetwork,
     **others: Sequence[AnyArray | tuple[int, ...]],
 ) -> dict[str, str]:
     """What tells each input of a training from another, wherever its file lies.
@@ -164,7 +164,7 @@ def fingerprints(
         **{name: _digest(*arrays) for name, arrays in others.items()},
         "style picture": _digest(style),
         "options": hashlib.sha256(json.dumps(options).encode()).hexdigest(),
-        "weights of VGG16": vgg.origin,
+        "network that compares": network.origin,
     }
 
 

@@ -28,7 +28,8 @@ class ViewConfig:
     """Integrand: emission and absorption, or the paper's as printed."""
     cell_opacity: float = 0.95
     """Without a given gamma, one is chosen that makes a typical cell this opaque: high shows the
-    texture of the surface, low mixes many cells along a ray."""
+    texture of the surface, low mixes many cells along a ray. For the paper's integrand it is chosen
+    so that typical smoke is as bright as its colour."""
     gamma: float | None = None
     """Extinction of density 1, per cell; chosen from the frame unless given."""
 
@@ -70,15 +71,14 @@ class TrainConfig(CourseConfig):
 # gradients let patterns hold their shape.
 _ANYWHERE = RuleConfig(sobel_divisor=8, position_prior=False)
 
-# About a pixel a cell, and the picture so large that cells can have its strokes: of finer detail
-# comes grain.
+# About a pixel a cell: of finer detail comes grain.
 _DRAFT = TrainConfig(
     iterations=250,
     learning_rate=1e-3,
     view=ViewConfig(size=96),
     pool=PoolConfig(size=16),
     rule=_ANYWHERE,
-    appearance=AppearanceConfig(grey=False, samples=512, style_scale=1.5),
+    appearance=AppearanceConfig(grey=False, samples=512),
     motion=MotionConfig(weight=0.3),
 )
 
@@ -99,7 +99,8 @@ PRESETS = {
         view=ViewConfig(size=256, elevation=0.0, mode="paper"),
         pool=PoolConfig(size=256),
         rule=RuleConfig(hidden=128),
-        appearance=AppearanceConfig(pixels=0.0),
+        appearance=AppearanceConfig(pixels=0.0, style_scale=1.0),
+        features="vgg16",
     ),
 }
 """Training on smoke by name, for rules that begin with a texture: `draft` in minutes on two cores,

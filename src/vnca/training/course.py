@@ -67,8 +67,9 @@ class CourseConfig(ABC):
     """Most steps of the automaton in an iteration."""
     overflow: float = 100.0
     """Weight of the penalty on states beyond ±1."""
-    features: str = "edges"
-    """Weights of VGG16: edges, imagenet or a path."""
+    features: str = "efficientnet"
+    """Network that compares pictures: efficientnet, edges, imagenet, vgg16 (imagenet where it was
+    fetched before, else edges), or the path of a VGG's weights."""
     backend: Literal["auto", "native", "triton", "reference"] = "auto"
     """What computes the automaton."""
     seed: int = 0

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from vnca.automaton.rule import DENSITY_CHANGE, Rule
 from vnca.errors import DivergenceError
-from vnca.features.vgg import VGG16
+from vnca.features.network import FeatureNetwork
 from vnca.kernels.update.backend import torch_step
 from vnca.kernels.update.mask import changing_rows
 from vnca.kernels.update.reference import Weights
@@ -72,7 +72,7 @@ class Trainer:
         rule: Rule,
         style: FloatArray,
         config: CourseConfig,
-        vgg: VGG16,
+        network: FeatureNetwork,
         *,
         motion: MotionSupervision | None = None,
         memory_budget: int | None = None,
@@ -84,7 +84,7 @@ class Trainer:
             rule: The rule to begin with.
             style: Linear RGB `[r, c, 3]`.
             config: The hyperparameters.
-            vgg: The frozen network that judges pictures.
+            network: The frozen network that judges pictures.
             motion: What judges how they move, if anything does.
             memory_budget: Bytes that the program may take: rollouts keep as few states as that
                 asks for, and compute the others again. The result is the same to the bit.
@@ -111,7 +111,9 @@ class Trainer:
                 laplacian_divisor=config.rule.laplacian_divisor,
             )
         ).to(device)
-        self._appearance = AppearanceLoss(vgg, style, config.appearance, config.pictures.size)
+        self._appearance = AppearanceLoss(
+            network, style, config.appearance, config.pictures.size, scene.width
+        )
         self._motion = motion
         self._random = np.random.default_rng(config.seed)
         self._generator = torch.Generator().manual_seed(config.seed)
@@ -139,6 +141,16 @@ class Trainer:
     def background(self) -> Tensor:
         """Linear RGB `[3]` that pictures are composited over: the style's mean colour."""
         return self._appearance.background
+
+    @property
+    def style_scale(self) -> float:
+        """Shorter side of the style picture relative to the pictures compared with it."""
+        return self._appearance.style_scale
+
+    @property
+    def picture_cells(self) -> float:
+        """Cells along the shorter side of the style picture, as the rule is shown it."""
+        return self.style_scale * self.scene.width
 
     @property
     def learning_rate(self) -> float:
@@ -226,7 +238,10 @@ class Trainer:
         self._steps += steps
         sight = scene.sight(self._random)
         pictures, opacity = scene.pictures(state, sight, self.background)
-        appearance = self._appearance(pictures, opacity, self._generator)
+        grey = None
+        if config.appearance.shows_density:
+            grey = scene.density_pictures(state, sight, self.background)
+        appearance = self._appearance(pictures, opacity, self._generator, grey)
         others = {"overflow": config.overflow * self._overflow(state[:-1])}
         if self._motion is not None and before.any():  # a state of zeros has no texture to move
             others["motion"] = self._motion.loss(

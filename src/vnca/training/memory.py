@@ -14,9 +14,9 @@ from vnca.training.course import CourseConfig
 from vnca.training.rollout import fewest_kept
 from vnca.training.scene import Scene
 
-PIXEL_BYTES = 7000
-"""A pixel of a picture with all that VGG16 computes from it. Measured at 128² to 256² pixels: 5,200
-to 6,900 bytes in bfloat16, 7,100 to 9,600 in float32."""
+PIXEL_BYTES = 6000
+"""A pixel of a picture, once in colour and once in grey, with all that a network computes from it.
+Measured at 128² and 256² pixels: EfficientNet 5,700 bytes, VGG16 3,100 to 4,800."""
 SAMPLE_BYTES = {"cpu": 30, "cuda": 130}
 """A sample on a pixel's ray, if the smoke's box fills the picture. Measured at 32³ and 64³ cells,
 128² and 192² pixels; what a GPU runs was measured on the CPU."""
@@ -61,11 +61,13 @@ def memory_needs(scene: Scene[Any], config: CourseConfig) -> MemoryNeeds:
     state = cells * config.rule.channels * 4
     mask = cells * config.rule.update_probability * 4
     sample = SAMPLE_BYTES["cpu" if scene.priors.device.type == "cpu" else "cuda"]
-    seen = config.pictures
+    seen, appearance = config.pictures, config.appearance
+    pixel = PIXEL_BYTES * (appearance.colour + appearance.grey)
+    pixel += (1 + appearance.shows_density) * scene.samples * sample
     return MemoryNeeds(
         pool=config.pool.size * state,
         state=round(state + mask),
-        pictures=round(seen.count * seen.size**2 * (PIXEL_BYTES + scene.samples * sample)),
+        pictures=round(seen.count * seen.size**2 * pixel),
         work=cells * CELL_BYTES + prod(box.shape) * BOX_BYTES + STATES_AT_WORK * state,
     )
 

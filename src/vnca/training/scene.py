@@ -22,6 +22,7 @@ class Scene(ABC, Generic[Sight]):
         neighbours: `[27, n]` rows of the state around each cell.
         priors: `[n, 7]`.
         samples: About how many are taken along the ray of a pixel.
+        width: Cells across a picture.
         paints_density: Whether a rule may change the density. If not, its weights that would do
             so are never trained.
     """
@@ -29,9 +30,11 @@ class Scene(ABC, Generic[Sight]):
     samples = 1.0
     paints_density = True
 
-    def __init__(self, domain: Domain, priors: FloatArray, device: torch.device | str) -> None:
+    def __init__(
+        self, domain: Domain, priors: FloatArray, device: torch.device | str, *, width: float
+    ) -> None:
         """Put the cells and what they are told, `[n, 7]`, where is computed."""
-        self.domain = domain
+        self.domain, self.width = domain, width
         self.neighbours = torch.from_numpy(domain.neighbours).to(device)
         self.priors = torch.from_numpy(priors).to(device)
         self._places = torch.from_numpy(domain.places).to(device)
@@ -67,6 +70,14 @@ class Scene(ABC, Generic[Sight]):
         Returns:
             sRGB `[b, 3, r, c]` over the background, and opacity `[b, r, c]`.
         """
+
+    def density_pictures(self, state: Tensor, sight: Sight, background: Tensor) -> Tensor | None:
+        """The density that `pictures` shows coloured, in grey: sRGB `[b, 3, r, c]`.
+
+        Differentiable in the state. None of a scene whose density is not painted.
+        """
+        del state, sight, background
+        return None
 
     @abstractmethod
     def portraits(self, state: Tensor, size: int) -> list[FloatArray]:

@@ -6,15 +6,15 @@ import torch
 
 from vnca.automaton.rule import Rule, Scales, density_scale
 from vnca.features.flow import FlowNetwork
-from vnca.features.vgg import VGG16
+from vnca.features.network import FeatureNetwork
 from vnca.io.orientation import on_lattice
 from vnca.lattice import Lattice, Region
-from vnca.render.brightness import gamma_for_cell_opacity
-from vnca.training.config import TrainConfig
+from vnca.render.brightness import gamma_for_cell_opacity, gamma_for_own_colour
+from vnca.training.config import TrainConfig, ViewConfig
 from vnca.training.loop import Trainer
 from vnca.training.motion import MotionSupervision
 from vnca.training.smoke_scene import SmokeScene, velocity_scale
-from vnca.typing import FloatArray
+from vnca.typing import AnyArray, FloatArray
 from vnca.volume import Volume
 
 
@@ -22,7 +22,7 @@ def smoke_trainer(
     smoke: Volume,
     style: FloatArray,
     config: TrainConfig,
-    vgg: VGG16,
+    network: FeatureNetwork,
     *,
     device: torch.device | str = "cpu",
     memory_budget: int | None = None,
@@ -33,7 +33,7 @@ def smoke_trainer(
         smoke: The frame, which is laid on a lattice of its own.
         style: Linear RGB `[r, c, 3]`.
         config: The hyperparameters.
-        vgg: The frozen network that judges pictures.
+        network: The frozen network that judges pictures.
         device: Where to compute.
         memory_budget: Bytes that the program may take; see `Trainer`.
 
@@ -49,13 +49,21 @@ def smoke_trainer(
     motion = None
     if config.motion.weight and scene.moves:
         motion = MotionSupervision(config.motion, FlowNetwork.load(device), scene)
-    return Trainer(scene, rule, style, config, vgg, motion=motion, memory_budget=memory_budget)
+    return Trainer(scene, rule, style, config, network, motion=motion, memory_budget=memory_budget)
 
 
 def choose_scales(smoke: Volume, config: TrainConfig) -> Scales:
     """Normalisers from the frame a rule is trained on."""
     density = density_scale(smoke.density)
-    gamma = config.view.gamma or gamma_for_cell_opacity(
-        smoke.density / density, config.view.cell_opacity
+    return Scales(
+        density=density,
+        velocity=velocity_scale(smoke),
+        gamma=config.view.gamma or _gamma(smoke.density / density, config.view),
     )
-    return Scales(density=density, velocity=velocity_scale(smoke), gamma=gamma)
+
+
+def _gamma(density: AnyArray, view: ViewConfig) -> float:
+    """What suits the integrand that training looks with."""
+    if view.mode == "paper":
+        return gamma_for_own_colour(density)
+    return gamma_for_cell_opacity(density, view.cell_opacity)

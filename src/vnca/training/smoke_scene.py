@@ -12,15 +12,18 @@ from torch import Tensor
 
 from vnca.automaton.domain import Domain
 from vnca.automaton.priors import DENSITY, VELOCITY, priors, told_velocity
+from vnca.automaton.priors import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
 from vnca.automaton.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
-from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable
+from vnca.camera import Camera, Orthographic, Perspective, frame_box, turntable, world_box
 from vnca.errors import GridError
+from vnca.losses.pixels import luminance
+from vnca.render.brightness import gamma_for_own_colour
 from vnca.render.colour import linear_to_srgb, srgb_to_linear
 from vnca.render.velocity import projected_velocity
 from vnca.render.view import View, render
 from vnca.training.config import ViewConfig
 from vnca.training.scene import Scene
-from vnca.typing import Box, FloatArray
+from vnca.typing import AnyArray, Box, FloatArray
 from vnca.volume import Volume
 
 SPEEDS = (0.25, 1.5)
@@ -35,6 +38,8 @@ PORTRAIT_STEP = 0.5
 """Distance between samples along a ray, cells: finer than in training, without terraces."""
 PORTRAIT_BACKGROUND = 0.01
 """Linear grey behind the smoke."""
+_UPRIGHT = 1e-6
+"""Cells turned and stretched by less than this are upright cubes."""
 
 
 class SmokeSight(NamedTuple):
@@ -94,9 +99,14 @@ class SmokeScene(Scene[SmokeSight]):
                 reach=rule.config.reach,
                 box=box,
             )
-        super().__init__(domain, priors(domain, smoke, rule), device)
+        width = view_width(self.box, smoke.index_to_world)
+        super().__init__(domain, priors(domain, smoke, rule), device, width=width)
+        self._place = _stood(smoke.index_to_world)
         self.samples = max(domain.box.shape) / view.step
         self.gamma = rule.scales.gamma
+        self._grey_gamma = self.gamma
+        if view.mode != "paper":
+            self._grey_gamma = gamma_for_own_colour(smoke.density / rule.scales.density)
         density = smoke.density_field.gather(domain.cells) / rule.scales.density
         self._density = torch.from_numpy(density.astype(np.float32)).to(device)
         velocity = np.zeros((len(domain), 3), dtype=np.float32)
@@ -128,19 +138,24 @@ class SmokeScene(Scene[SmokeSight]):
         scene.velocity = torch.from_numpy(velocity).to(self.velocity)
         scene.priors = self.priors.clone()
         scene.priors[:, VELOCITY] = told.to(self.priors)
-        scene.priors[:, DENSITY] *= denser
+        if self._rule.config.density_prior:
+            density = (self._density * denser).clamp_max(TOLD_DENSITY_LIMIT)
+            scene.priors[:, DENSITY] = density[:, None]
         return scene
 
     def camera(
         self, azimuth: float, elevation: float, *, aspect: float = 1.0
     ) -> Orthographic | Perspective:
-        """A camera around the smoke, as near to its bounding box as that side allows."""
+        """A camera around the smoke, as near to its bounding box as that side allows.
+
+        It is in the world, where lengths are those of a cell.
+        """
         return frame_box(*self._corners, azimuth, elevation, aspect=aspect)
 
     @property
     def _corners(self) -> tuple[list[float], list[float]]:
         lower, upper = (np.asarray(c) - self.domain.box.lower - 0.5 for c in self.box)
-        return lower.tolist(), upper.tolist()
+        return _around(lower, upper, self._place)
 
     def sight(self, random: np.random.Generator) -> SmokeSight:
         """A camera around the smoke, and where along the rays sampling begins."""
@@ -159,6 +174,29 @@ class SmokeScene(Scene[SmokeSight]):
         view = self.look(state, sight.camera, offset=sight.offset)
         picture = linear_to_srgb(view.over(background))
         return picture.permute(2, 0, 1)[None], view.opacity[None]
+
+    def density_pictures(self, state: Tensor, sight: SmokeSight, background: Tensor) -> Tensor:
+        """The density in grey, as `Scene.density_pictures` has it.
+
+        I = Σ d' τ over the cells of a ray, by the paper's integrand whatever that of the colours:
+        by emission and absorption, white smoke that lets nothing through is white, however dense.
+
+        Reference: VNCA, the equations for I and for L_app.
+        """
+        density = self._painted_density(state)
+        view = render(
+            density,
+            density.new_ones(1).expand(*density.shape, 3),
+            sight.camera,
+            rows=self.view.size,
+            columns=self.view.size,
+            gamma=self._grey_gamma,
+            offset=sight.offset,
+            mode="paper",
+            cells_to_world=self._place,
+        )
+        behind = srgb_to_linear(luminance(linear_to_srgb(background).view(1, 3, 1, 1))).view(3)
+        return linear_to_srgb(view.over(behind)).permute(2, 0, 1)[None]
 
     def portraits(self, state: Tensor, size: int) -> list[FloatArray]:
         """Views from the front, the right, the back and above."""
@@ -190,6 +228,7 @@ class SmokeScene(Scene[SmokeSight]):
             step=view.step,
             offset=offset,
             mode=view.mode,
+            cells_to_world=self._place,
         )
 
     def motion(self, state: Tensor, sight: SmokeSight, size: int) -> tuple[Tensor, Tensor]:
@@ -207,6 +246,7 @@ class SmokeScene(Scene[SmokeSight]):
             step=self.view.step,
             offset=sight.offset,
             mode=self.view.mode,
+            cells_to_world=self._place,
         )
 
     def _painted_density(self, state: Tensor) -> Tensor:
@@ -214,9 +254,32 @@ class SmokeScene(Scene[SmokeSight]):
         return self.dense(self._density * (1 + change))
 
 
-def view_width(box: Box) -> float:
+def view_width(box: Box, index_to_world: AnyArray) -> float:
     """Cells across a view of training, the same from all sides: patterns keep their size."""
-    return _level_turntable(box.lower, box.upper).height
+    lower, upper = (np.asarray(corner) for corner in box)
+    return _level_turntable(*_around(lower, upper, _stood(index_to_world))).height
+
+
+def _stood(index_to_world: AnyArray) -> AnyArray | None:
+    """4×4, how cells stand in the world and what shape they have there, in lengths of a cell.
+
+    None for upright cubes, which need not be turned.
+    """
+    linear = index_to_world[:3, :3] / np.cbrt(abs(np.linalg.det(index_to_world[:3, :3])))
+    if np.allclose(linear, np.eye(3), rtol=0, atol=_UPRIGHT):
+        return None
+    place = np.eye(4)
+    place[:3, :3] = linear
+    return place
+
+
+def _around(
+    lower: AnyArray, upper: AnyArray, place: AnyArray | None
+) -> tuple[list[float], list[float]]:
+    """The box around cells, where cameras are."""
+    if place is not None:
+        lower, upper = world_box(lower, upper, place)
+    return lower.tolist(), upper.tolist()
 
 
 def _level_turntable(

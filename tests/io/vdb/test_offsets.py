@@ -127,6 +127,19 @@ def test_openvdb_reads_such_files_alike(
                 assert_agrees(header.read(), expected)
 
 
+def test_grids_that_share_a_tree_are_copied_alike_whatever_offsets_say(
+    written_by_openvdb: Path, tmp_path: Path
+) -> None:
+    original, other = written_by_openvdb / "several.vdb", tmp_path / "other.vdb"
+    copies = set()
+    for change in (bytes, *KINDS.values()):
+        other.write_bytes(change(original.read_bytes()))
+        with open_vdb(other) as file:
+            write_vdb(tmp_path / "copy.vdb", list(file.grids.values()), file.metadata)
+        copies.add((tmp_path / "copy.vdb").read_bytes())
+    assert len(copies) == 1
+
+
 def test_files_of_other_writers_read_and_copy_as_in_openvdb(
     judge: Judge, assert_agrees: Agreement, tmp_path: Path
 ) -> None:

@@ -1,5 +1,7 @@
 """OpenVDB and this reader and writer understand each other's files."""
 
+import ast
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 
 from vnca.errors import GridError
+from vnca.io.provenance import Provenance
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write, write_vdb
 from vnca.io.vdb.compression import Codec
@@ -290,3 +293,21 @@ def test_a_wind_in_large_turned_cells_of_openvdb_is_read_in_those_of_the_smoke(
     assert smoke.voxel_size == pytest.approx((0.1, 0.1, 0.1))
     places = 0.1 * np.stack(np.indices(smoke.density.shape), axis=-1)
     np.testing.assert_allclose(smoke.velocity, places / 0.1, atol=1e-4)  # type: ignore[arg-type]
+
+
+def test_openvdb_reads_what_a_painting_tells_of_itself(openvdb_python: str, tmp_path: Path) -> None:
+    told = Provenance(2.5, 0.75, "z", {"model": "night", "refine": 2, "strength": 0.5})
+    values = np.ones((2, 2, 2), np.float32)
+    path = tmp_path / "painted.vdb"
+    grid = Grid.from_dense(
+        "density", values, values > 0, (0, 0, 0), transform=Transform.uniform(0.1)
+    )
+    write_vdb(path, [grid], metadata=told.metadata)
+    script = "import pyopenvdb, sys; print(sorted(pyopenvdb.readAll(sys.argv[1])[1].items()))"
+    command = [openvdb_python, "-c", script, str(path)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    seen = dict(ast.literal_eval(done.stdout))
+    assert seen.items() >= {
+        "vnca_extinction": 2.5, "vnca_gamma": 0.75, "vnca_up_axis": "z", "vnca_model": "night",
+        "vnca_refine": 2, "vnca_strength": 0.5,
+    }.items()  # fmt: skip

@@ -131,7 +131,7 @@ class GridHeader:
         if owner.end is None or self.end is None:
             return (
                 f"is of type {self.value_type} behind a {self.map_type}: in a file without offsets "
-                "where it ends is not known; write the file again, or without this grid"
+                "nothing tells where it ends; write the file again, or without this grid"
             )
         if owner is not self and owner.tree_start is None:
             return f"shares the tree of a grid with a {owner.map_type}"
@@ -143,8 +143,11 @@ class GridHeader:
         is_known = self.value_type in VALUE_TYPES and self.compression <= _ALL_FLAGS
         return is_known and self.tree_start is not None
 
-    def measured(self) -> "GridHeader":
+    def measured(self, limit: int) -> "GridHeader":
         """The same with the true `blocks` and `end`, where its tree is of a kind that is known.
+
+        Args:
+            limit: Byte beyond which it cannot end.
 
         Raises:
             FileFormatError: If the tree is truncated or corrupt.
@@ -156,7 +159,7 @@ class GridHeader:
             return replace(self, end=self.tree_start)
         if not self._is_of_known_layout:
             return self
-        cursor = self.source.cursor(self.tree_start, self.source.size, self.name)
+        cursor = self.source.cursor(self.tree_start, limit, self.name)
         value_type = VALUE_TYPES[self.value_type]
         blocks = locate_leaves(cursor, value_type, is_half=self.is_half, flags=self.compression)
         return replace(self, blocks=blocks, end=cursor.position)
@@ -281,7 +284,7 @@ def read_header(
     if parent and (parent.type_name, parent.is_half) != (header.type_name, header.is_half):
         raise cursor.error(f"corrupt: grid {name!r} shares a tree of another type")
     if header.end is None or (is_last and header.end < cursor.end):
-        header = header.measured()
+        header = header.measured(cursor.end)
     if header.end is None and source.has_offsets:
         raise cursor.error(
             f"truncated or corrupt: grid {name!r} claims bytes {start} to {end} of {cursor.end}"

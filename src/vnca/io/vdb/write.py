@@ -162,7 +162,7 @@ def _copied(header: GridHeader, name: bytes) -> _Part:
         raise GridError(f"{label} {obstacle}")
     assert owner.end is not None
     assert header.end is not None
-    blocks = owner.blocks or owner.measured().blocks or owner.end
+    blocks = owner.blocks or owner.measured(owner.end).blocks or owner.end
     metadata = header.metadata
     if header.source.library < _INDEX_LIBRARY:
         metadata = Metadata(metadata)

@@ -1,3 +1,5 @@
+from collections.abc import Sequence
+
 from vnca.typing import FloatArray, IntArray
 
 def instructions(bfloat16: bool, /) -> list[str]: ...
@@ -32,6 +34,40 @@ def backward(
     to_output: FloatArray,
     threads: int,
     bfloat16: bool,
+    instructions: str,
+    /,
+) -> None: ...
+def decode_instructions() -> list[str]: ...
+def decode_forward(
+    state: FloatArray,
+    rows: IntArray,
+    fractions: FloatArray,
+    weights: Sequence[FloatArray],
+    out: FloatArray,
+    threads: int,
+    instructions: str,
+    /,
+) -> None: ...
+def decode_subdivided(
+    state: FloatArray,
+    cells: IntArray,
+    neighbours: IntArray,
+    factor: int,
+    weights: Sequence[FloatArray],
+    out: FloatArray,
+    threads: int,
+    instructions: str,
+    /,
+) -> None: ...
+def decode_backward(
+    state: FloatArray,
+    rows: IntArray,
+    fractions: FloatArray,
+    weights: Sequence[FloatArray],
+    gradient: FloatArray,
+    to_state: FloatArray,
+    to_weights: Sequence[FloatArray],
+    threads: int,
     instructions: str,
     /,
 ) -> None: ...

@@ -52,5 +52,8 @@ def mask_key(seed: int, step: int) -> np.uint32:
 
 
 def mask_threshold(probability: float) -> np.uint32:
-    """The hash from which a cell does not change, for a probability under 1."""
-    return np.uint32(round(probability * 2**32))
+    """The hash from which a cell does not change, for a probability between 0 and 1.
+
+    At least one hash changes and one does not, however near to 0 or 1 the probability.
+    """
+    return np.uint32(min(max(round(probability * 2**32), 1), 2**32 - 1))

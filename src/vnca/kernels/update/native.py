@@ -56,7 +56,7 @@ def instructions(precision: Precision = "float32") -> list[str]:
         BackendUnavailableError: If there is none, or the extension was not built.
         OptionError: If there is no precision of that name.
     """
-    return _extension(precision).instructions(precision == "bfloat16")
+    return extension(precision).instructions(precision == "bfloat16")
 
 
 def default_threads() -> int:
@@ -112,7 +112,7 @@ def forward(
         out = np.empty_like(state)
     arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, out)
     options = (threads or default_threads(), precision == "bfloat16", instructions)
-    _checked(_extension(precision).forward, *arguments, *options)
+    checked("update step", extension(precision).forward, *arguments, *options)
     return out
 
 
@@ -141,25 +141,36 @@ def backward(
     results = tuple(np.empty_like(array) for array in (state, hidden, bias, output))
     arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, gradient)
     options = (threads or default_threads(), precision == "bfloat16", instructions)
-    _checked(_extension(precision).backward, *arguments, *results, *options)
+    checked("update step", extension(precision).backward, *arguments, *results, *options)
     to_state, to_hidden, to_bias, to_output = results
     return to_state, to_hidden, to_bias, to_output
 
 
-def _extension(precision: Precision) -> Any:
+def extension(precision: Precision = "float32") -> Any:
+    """The module of the native kernels.
+
+    Raises:
+        BackendUnavailableError: If it was not built, or this machine has no such precision.
+        OptionError: If there is no precision of that name.
+    """
     reason = unavailable(precision)
     if reason is not None:
         raise BackendUnavailableError(f"the native kernel cannot run: {reason}")
     return _native
 
 
-def _checked(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+def checked(operation: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """The result of a native function.
+
+    Raises:
+        ShapeError: Naming the operation and the array, if it refuses one.
+    """
     try:
         return function(*args, **kwargs)
     except ValueError as error:
-        raise ShapeError(f"update step: {error}") from None
+        raise ShapeError(f"{operation}: {error}") from None
     except TypeError:
         raise ShapeError(
-            "update step: expected arrays of float32 or int32 in this machine's byte order, those "
+            f"{operation}: expected arrays of float32 or int32 in this machine's byte order, those "
             "to be written to writable, and at most 2³¹ threads"
         ) from None

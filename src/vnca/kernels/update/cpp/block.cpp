@@ -11,12 +11,6 @@ namespace {
 
 // ---- Where things lie ------------------------------------------------------------------------
 
-// The stride of rows in scratch: an odd number of vectors, so that rows start in different sets of
-// the cache.
-constexpr std::size_t stride_of(std::size_t numbers) {
-    return (round_up(units(numbers), LANES) / LANES | 1) * LANES;
-}
-
 struct Layout {
     int channels, inputs, filtered, hidden;  // inputs: perception and priors
     std::size_t wide_channels, wide_filtered, wide_hidden;  // whole vectors

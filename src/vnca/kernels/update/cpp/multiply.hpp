@@ -1,4 +1,4 @@
-// Products of matrices that fit into the cache. For block.cpp alone, like vector.hpp.
+// Products of matrices that fit into the cache. For the inner loops alone, like vector.hpp.
 #pragma once
 
 #include "block.hpp"

@@ -3,63 +3,15 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
-#include <memory>
-#include <new>
 #include <vector>
 
 #include "crew.hpp"
+#include "floats.hpp"
+#include "processor.hpp"
+#include "ranges.hpp"
 
 namespace vnca {
 namespace {
-
-// Cells are divided among at most TASKS ranges, a division that does not depend on the number of
-// threads: sums are then made in the same order whoever makes them.
-constexpr std::int64_t TASKS = 64, SMALLEST = 1024;
-
-struct Ranges {
-    std::int64_t cells, length;
-    int count;
-
-    explicit Ranges(std::int64_t n)
-        : cells(n),
-          length(std::max(SMALLEST, (n + TASKS - 1) / TASKS)),
-          count(int((n + length - 1) / length)) {}
-
-    std::int64_t begin(int range) const { return range * length; }
-    std::int64_t end(int range) const { return std::min(cells, (range + 1) * length); }
-};
-
-// Memory for vectors, filled with zeros.
-class Floats {
-public:
-    explicit Floats(std::size_t size) : size_(size), data_(allocate(size)) {
-        std::memset(data_.get(), 0, size * sizeof(float));
-    }
-    float* data() { return data_.get(); }
-    std::size_t size() const { return size_; }
-
-    void grow(std::size_t size) {
-        if (size <= size_) return;
-        size = std::max(size, 2 * size_);
-        std::unique_ptr<float, Free> grown = allocate(size);
-        std::memcpy(grown.get(), data_.get(), size_ * sizeof(float));
-        std::memset(grown.get() + size_, 0, (size - size_) * sizeof(float));
-        data_ = std::move(grown);
-        size_ = size;
-    }
-
-private:
-    static constexpr std::align_val_t LINE{64};
-    struct Free {
-        void operator()(float* p) const { ::operator delete(p, LINE); }
-    };
-    static std::unique_ptr<float, Free> allocate(std::size_t size) {
-        return std::unique_ptr<float, Free>(
-            static_cast<float*>(::operator new(size * sizeof(float), LINE)));
-    }
-    std::size_t size_;
-    std::unique_ptr<float, Free> data_;
-};
 
 // Looks up the neighbours of a block's cells; false if one is out of range. What is dereferenced
 // later is this copy.
@@ -108,13 +60,6 @@ bool each_block(const Step& step, Rows rows, std::int64_t begin, std::int64_t en
     return true;
 }
 
-// What a range adds to the gradient of cells outside it, in the order of the ranges they are in.
-struct Spill {
-    std::vector<std::int32_t> rows;
-    std::vector<float> values;        // [rows, channels]
-    std::vector<std::int64_t> bounds;  // rows of range t are those from bounds[t] to bounds[t + 1]
-};
-
 // Sums the gradient of the state that the cells of one range cause. Every row that is met gets a
 // slot: first those of the range, then one for the outside, then the others as they come.
 class Gathering {
@@ -159,20 +104,7 @@ public:
                 to_state[row * channels_ + c] = gradient[row * channels_ + c] + sum[c];
         sum += stride_;  // of the outside, which is a constant
 
-        Spill spill;
-        spill.bounds.assign(ranges.count + 1, 0);
-        for (const std::int32_t row : others_) ++spill.bounds[row / ranges.length + 1];
-        for (int t = 0; t < ranges.count; ++t) spill.bounds[t + 1] += spill.bounds[t];
-        spill.rows.resize(others_.size());
-        spill.values.resize(others_.size() * channels_);
-        std::vector<std::int64_t> next(spill.bounds.begin(), spill.bounds.end() - 1);
-        for (const std::int32_t row : others_) {
-            const std::int64_t at = next[row / ranges.length]++;
-            spill.rows[at] = row;
-            std::memcpy(&spill.values[at * channels_], sum, channels_ * sizeof(float));
-            sum += stride_;
-        }
-
+        Spill spill = Spill::of(others_, sum, stride_, channels_, ranges);
         std::fill(slot_of_.begin() + begin_, slot_of_.begin() + end_, -1);
         for (const std::int32_t row : others_) slot_of_[row] = -1;
         others_.clear();
@@ -186,23 +118,6 @@ private:
     std::vector<std::int32_t> slot_of_, others_;
     Floats sums_;
 };
-
-bool runs_avx512() {
-#if defined(__x86_64__)
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw");
-#else
-    return false;
-#endif
-}
-
-bool runs_avx2() {
-#if defined(__x86_64__)
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-    return false;
-#endif
-}
 
 }  // namespace
 
@@ -282,11 +197,7 @@ bool backward(const Kernel& kernel, const Step& step, Rows rows, const float* gr
     if (!valid) return false;
 
     crew.run(ranges.count, threads, [&](int range, int) {
-        for (const Spill& spill : spills)
-            for (std::int64_t i = spill.bounds[range]; i < spill.bounds[range + 1]; ++i)
-                for (int c = 0; c < channels; ++c)
-                    to.state[std::int64_t(spill.rows[i]) * channels + c] +=
-                        spill.values[i * channels + c];
+        for (const Spill& spill : spills) spill.add_to(to.state, channels, range);
     });
     std::fill_n(to.state + step.cells * channels, channels, 0.0f);
 

@@ -1,10 +1,10 @@
-// Vectors, and the numbers that products are made of. For block.cpp alone, which is compiled once
-// for each instruction set, with VNCA_TARGET naming it; vectors are the compiler's own, as wide as
-// the flags of the target allow.
+// Vectors, and the numbers that products are made of. For the inner loops alone (block.cpp here and
+// decode_block.cpp), which are compiled once for each instruction set, with VNCA_TARGET naming it;
+// vectors are the compiler's own, as wide as the flags of the target allow.
 //
 // Everything here is local to the file that includes it, and no function of the standard library is
-// called but memcpy: an inline function compiled for AVX-512 must never be the one that the linker
-// keeps.
+// called but memcpy, sin and cos: an inline function compiled for AVX-512 must never be the one that
+// the linker keeps.
 #pragma once
 
 #include <cstddef>
@@ -101,6 +101,12 @@ INLINE const Unit* interleave(const Unit* rows, std::size_t, int, int, Unit*) { 
 static_assert(sizeof(Unit) == sizeof(float) && sizeof(Number) * DEPTH == sizeof(Unit));
 
 constexpr std::size_t units(std::size_t numbers) { return (numbers + DEPTH - 1) / DEPTH; }
+
+// The stride of rows in scratch: an odd number of vectors, so that rows start in different sets of
+// the cache.
+constexpr std::size_t stride_of(std::size_t numbers) {
+    return (round_up(units(numbers), LANES) / LANES | 1) * LANES;
+}
 
 }  // namespace
 }  // namespace vnca::VNCA_TARGET

@@ -1,0 +1,110 @@
+"""How wide the strokes of a picture are, and how large it is to be shown for cells to have them.
+
+A stroke is a ridge, bright or dark: the picture is extremal across it. Blurred by as much as it is
+wide, it stands out most; so each point of a ridge has a width. They are averaged over the area that
+ridges cover, weighed by their contrast.
+"""
+
+from math import exp, log, pi, sqrt
+
+import numpy as np
+import torch
+from scipy.ndimage import gaussian_filter
+from torch.nn import functional
+
+from vnca.colour import linear_to_srgb
+from vnca.typing import AnyArray, BoolArray, FloatArray
+
+STROKE_CELLS = 3.0
+"""Cells that a stroke spans."""
+STROKE_PIXELS = 2.0
+"""Pixels that it spans at least: what is smaller cannot be compared."""
+FINEST, COARSEST = 3 / 128, 3 / 48
+"""Relative to the picture's shorter side: what is finer or coarser is taken for this. A picture of
+finer strokes would be far larger than a block, one of coarser ones would have too few cells."""
+
+_SIZE = 256  # pixels along the shorter side in which ridges are sought
+_FIRST, _AN_OCTAVE, _SCALES = 0.63, 3, 18  # of the blurs, pixels
+_GAMMA = 0.75  # of the normalisation over scales, for ridges (Lindeberg 1998)
+_WIDTH = pi * sqrt(1 / (2 * _GAMMA))  # of a stripe, in units of the blur it stands out most in
+_BESIDE = 0.6  # pixels between a point of a ridge and its crest, at most
+_FAINTEST = 0.01  # contrast that is structure, of 0 to 1
+
+
+def stroke_width(picture: FloatArray) -> float | None:
+    """Width of the strokes of a picture, relative to its shorter side; None if it is flat.
+
+    The geometric mean over the ridges of the colour that varies most.
+
+    Args:
+        picture: Linear RGB `[r, c, 3]`.
+
+    Reference: Lindeberg 1998, section 5 (edge and ridge detection with automatic scale selection).
+    """
+    shorter = min(picture.shape[:2])
+    if shorter > _SIZE:
+        picture, shorter = _reduced(picture, _SIZE / shorter), _SIZE
+    values = _principal(linear_to_srgb(picture.clip(0, 1)))
+    blurs = _FIRST * 2 ** (np.arange(_SCALES) / _AN_OCTAVE)
+    found = [_ridges(values, blur) for blur in blurs]
+    total, logarithms = 0.0, 0.0
+    for at in range(1, len(blurs) - 1):
+        strength, crest = found[at]
+        here = crest & (strength >= found[at - 1][0]) & (strength > found[at + 1][0])
+        area = blurs[at] * float(strength[here & (strength > _FAINTEST)].sum())
+        total += area
+        logarithms += area * log(blurs[at])
+    return _WIDTH * exp(logarithms / total) / shorter if total > 0 else None
+
+
+def picture_cells(picture: FloatArray, cells: float, pixels: int) -> float:
+    """Cells along the shorter side at which a picture is best shown.
+
+    Its strokes then span three cells, and two pixels at least. A flat picture has none to span
+    anything: it is shown once in a view.
+
+    Args:
+        picture: Linear RGB `[r, c, 3]`.
+        cells: Those across a view of what is trained on.
+        pixels: The same in pixels.
+    """
+    width = stroke_width(picture)
+    if width is None:
+        return cells
+    stroke = max(STROKE_CELLS, STROKE_PIXELS * cells / pixels)
+    return stroke / min(max(width, FINEST), COARSEST)
+
+
+def _reduced(picture: FloatArray, factor: float) -> FloatArray:
+    size = [round(n * factor) for n in picture.shape[:2]]
+    maps = torch.from_numpy(np.ascontiguousarray(picture, np.float32)).permute(2, 0, 1)[None]
+    reduced = functional.interpolate(maps, size, mode="bilinear", antialias=True)
+    return reduced[0].permute(1, 2, 0).numpy()
+
+
+def _principal(colours: AnyArray) -> AnyArray:
+    """`[r, c]`: colours along the direction in which they vary most."""
+    centred = colours - colours.mean((0, 1))
+    axes = np.linalg.eigh(np.einsum("rci,rcj->ij", centred, centred))[1]
+    return centred @ axes[:, -1]
+
+
+def _ridges(values: AnyArray, blur: float) -> tuple[AnyArray, BoolArray]:
+    """How much each pixel of a blurred picture is a ridge, and whether it lies on the crest."""
+
+    def derivative(*order: int) -> AnyArray:
+        return gaussian_filter(values, blur, order, mode="nearest")  # pyright: ignore[reportArgumentType]
+
+    yy, xy, xx = derivative(2, 0), derivative(1, 1), derivative(0, 2)
+    middle, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    bend = np.where(middle >= 0, middle + half, middle - half)  # the stronger curvature
+    # Across: of the two rows of (H - λ'), λ' the weaker, the longer one is the direction.
+    weak = np.where(middle >= 0, middle - half, middle + half)
+    one, other = np.stack([xx - weak, xy]), np.stack([xy, yy - weak])
+    lengths = np.hypot(*one), np.hypot(*other)
+    across = np.where(lengths[0] >= lengths[1], one, other) / np.maximum(
+        np.maximum(*lengths), 1e-12
+    )
+    slope = across[0] * derivative(0, 1) + across[1] * derivative(1, 0)
+    strength = blur ** (2 * _GAMMA) * np.abs(bend)
+    return strength, np.abs(slope) <= _BESIDE * np.abs(bend)

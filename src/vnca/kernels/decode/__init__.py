@@ -1,0 +1,1 @@
+"""What is seen at points between the cells of a state."""

@@ -1,0 +1,150 @@
+// The Python side of native decoding: checks every array, then works without the interpreter.
+
+#include "bind_decode.hpp"
+
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "arrays.hpp"
+#include "decode.hpp"
+
+namespace vnca {
+namespace {
+
+constexpr std::int64_t MOST_CHANNELS = 64, MOST_UNITS = 128;
+
+// Weights and bias of each layer in turn.
+using InputWeights = std::array<Input, 2 * LAYERS>;
+using OutputWeights = std::array<Output, 2 * LAYERS>;
+
+constexpr const char* NAMES[2 * LAYERS] = {"first weights",  "first bias",  "second weights",
+                                           "second bias",    "third weights", "third bias",
+                                           "output weights", "output bias"};
+
+Decoder checked(const Input& state, const InputWeights& weights) {
+    const std::int64_t rows = length(state, 0), channels = length(state, 1),
+                       units = length(weights[0], 0);
+    Decoder decoder;
+    decoder.state = data_of<float>(state, "state", {ANY, ANY});
+    in_range("cells", rows - 1, 0, INT32_MAX - 1);
+    in_range("channels", channels, SHOWN, MOST_CHANNELS);
+    in_range("units of a layer", units, 1, MOST_UNITS);
+    decoder.cells = rows - 1;
+    decoder.channels = int(channels);
+    for (int l = 0; l < LAYERS; ++l) {
+        const std::int64_t inputs = l == 0 ? channels : units;
+        const std::int64_t outputs = l == LAYERS - 1 ? SHOWN : units;
+        decoder.layers[l] = {int(inputs), int(outputs),
+                             data_of<float>(weights[2 * l], NAMES[2 * l], {outputs, inputs}),
+                             data_of<float>(weights[2 * l + 1], NAMES[2 * l + 1], {outputs})};
+    }
+    return decoder;
+}
+
+Scattered scattered(const Input& rows, const Input& fractions) {
+    const std::int64_t points = length(fractions, 0);
+    const float* const within = data_of<float>(fractions, "fractions", {ANY, 3});
+    return {data_of<std::int32_t>(rows, "rows", {CORNERS, points}), within, points};
+}
+
+const DecodeKernel& kernel_named(const std::string& name) {
+    for (const DecodeKernel* const* kernel = decode_kernels(); *kernel != nullptr; ++kernel)
+        if (name.empty() || name == (*kernel)->name) return **kernel;
+    throw nb::value_error(("this machine does not run the native kernel for " + name).c_str());
+}
+
+void decode_to(const std::string& instructions, const Decoder& decoder, const PointSource& source,
+               float* out, int threads, const std::string& wrong) {
+    const DecodeKernel& kernel = kernel_named(instructions);
+    bool valid;
+    {
+        nb::gil_scoped_release released;
+        valid = decode(kernel, decoder, source, out, threads);
+    }
+    if (!valid) throw nb::value_error((wrong + std::to_string(decoder.cells)).c_str());
+}
+
+const char* const WRONG_ROWS = "rows: expected rows of the state, from 0 to ";
+
+std::vector<Extent> extents(const Input& state, const InputWeights& weights,
+                            std::initializer_list<Extent> others) {
+    std::vector<Extent> all(others);
+    all.emplace_back(state);
+    all.insert(all.end(), weights.begin(), weights.end());
+    return all;
+}
+
+}  // namespace
+
+void bind_decode(nb::module_& m) {
+    m.def("decode_instructions", [] {
+        std::vector<std::string> names;
+        for (const DecodeKernel* const* kernel = decode_kernels(); *kernel != nullptr; ++kernel)
+            names.emplace_back((*kernel)->name);
+        return names;
+    });
+
+    m.def("decode_forward", [](Input state, Input rows, Input fractions,
+                               const InputWeights& weights, Output out, int threads,
+                               const std::string& instructions) {
+        const Decoder decoder = checked(state, weights);
+        const Scattered source = scattered(rows, fractions);
+        float* const to = data_of<float>(out, "out", {source.count, SHOWN});
+        check_apart({out}, extents(state, weights, {rows, fractions}));
+        decode_to(instructions, decoder, source, to, threads, WRONG_ROWS);
+    });
+
+    m.def("decode_subdivided", [](Input state, Input cells, Input neighbours, int factor,
+                                  const InputWeights& weights, Output out, int threads,
+                                  const std::string& instructions) {
+        const Decoder decoder = checked(state, weights);
+        in_range("parts along a cell", factor, 1, Subdivided::FINEST);
+        const std::int32_t* const around =
+            data_of<std::int32_t>(neighbours, "neighbours", {NEIGHBOURS, decoder.cells});
+        const Subdivided source(data_of<std::int32_t>(cells, "cells", {ANY}), length(cells, 0),
+                                around, factor);
+        float* const to =
+            data_of<float>(out, "out", {length(cells, 0), factor, factor, factor, SHOWN});
+        check_apart({out}, extents(state, weights, {cells, neighbours}));
+        decode_to(instructions, decoder, source, to, threads,
+                  "cells or neighbours: expected cells, and rows of the state, below and up to ");
+    });
+
+    m.def("decode_backward", [](Input state, Input rows, Input fractions,
+                                const InputWeights& weights, Input gradient, Output to_state,
+                                const OutputWeights& to_weights, int threads,
+                                const std::string& instructions) {
+        const Decoder decoder = checked(state, weights);
+        const Scattered source = scattered(rows, fractions);
+        const DecodeKernel& kernel = kernel_named(instructions);
+        const float* const from = data_of<float>(gradient, "gradient", {source.count, SHOWN});
+        DecodeGradients to;
+        to.state = data_of<float>(to_state, "gradient of the state",
+                                  {decoder.cells + 1, decoder.channels});
+        for (int l = 0; l < LAYERS; ++l) {
+            const Layer& layer = decoder.layers[l];
+            to.weights[l] = data_of<float>(to_weights[2 * l], "gradient of the weights",
+                                           {layer.outputs, layer.inputs});
+            to.biases[l] = data_of<float>(to_weights[2 * l + 1], "gradient of a bias",
+                                          {layer.outputs});
+        }
+        std::vector<Extent> outputs(to_weights.begin(), to_weights.end());
+        outputs.emplace_back(to_state);
+        check_apart(outputs, extents(state, weights, {rows, fractions, gradient}));
+        bool valid;
+        {
+            nb::gil_scoped_release released;
+            valid = decode_backward(kernel, decoder, source, from, to, threads);
+        }
+        if (!valid)
+            throw nb::value_error((WRONG_ROWS + std::to_string(decoder.cells)).c_str());
+    });
+}
+
+}  // namespace vnca

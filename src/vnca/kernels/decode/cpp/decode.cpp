@@ -1,0 +1,236 @@
+#include "decode.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <vector>
+
+#include "crew.hpp"
+#include "floats.hpp"
+#include "processor.hpp"
+#include "ranges.hpp"
+
+namespace vnca {
+namespace {
+
+// What each of the eight corners counts, z fastest.
+void share_out(const float* fraction, float* share, std::size_t stride) {
+    for (int k = 0; k < CORNERS; ++k) {
+        const float x = k & 4 ? fraction[0] : 1 - fraction[0];
+        const float y = k & 2 ? fraction[1] : 1 - fraction[1];
+        const float z = k & 1 ? fraction[2] : 1 - fraction[2];
+        share[k * stride] = x * y * z;
+    }
+}
+
+// Calls visit(begin, points) for all points of a range, block by block; false if one goes wrong.
+template <class Visit>
+bool each_block(const Decoder& decoder, const PointSource& source, std::int64_t begin,
+                std::int64_t end, const Visit& visit) {
+    Points points;
+    for (; begin < end; begin += points.count) {
+        points.count = int(std::min<std::int64_t>(BLOCK, end - begin));
+        if (!source.find(decoder, begin, points)) return false;
+        visit(begin, points);
+    }
+    return true;
+}
+
+// Sums the gradient of the state that the points of one range cause. Every row that is met gets a
+// slot: the outside the first, the others as they come.
+class Gathering {
+public:
+    Gathering(const Decoder& decoder, std::size_t stride)
+        : cells_(decoder.cells),
+          channels_(decoder.channels),
+          stride_(stride),
+          slot_of_(decoder.cells + 1, -1),
+          sums_(stride) {
+        slot_of_[cells_] = 0;
+    }
+
+    void give_slots(Points& points) {
+        for (int k = 0; k < CORNERS; ++k)
+            for (int i = 0; i < points.count; ++i) {
+                std::int32_t& slot = slot_of_[points.corners[k][i]];
+                if (slot < 0) {
+                    met_.push_back(points.corners[k][i]);
+                    slot = std::int32_t(met_.size());
+                }
+                points.slots[k][i] = slot;
+            }
+        sums_.grow((met_.size() + 1) * stride_);
+    }
+
+    float* sums() { return sums_.data(); }
+
+    // What came together, by owners of the cells; then all is as at the beginning.
+    Spill finish(const Ranges& owners) {
+        Spill spill = Spill::of(met_, sums_.data() + stride_, stride_, channels_, owners);
+        std::memset(sums_.data(), 0, (met_.size() + 1) * stride_ * sizeof(float));
+        for (const std::int32_t row : met_) slot_of_[row] = -1;
+        met_.clear();
+        return spill;
+    }
+
+private:
+    std::int64_t cells_;
+    int channels_;
+    std::size_t stride_;
+    std::vector<std::int32_t> slot_of_, met_;
+    Floats sums_;
+};
+
+}  // namespace
+
+const DecodeKernel* const* decode_kernels() {
+    static const auto found = [] {
+        std::vector<const DecodeKernel*> list;
+#if defined(__x86_64__)
+        if (runs_avx512()) list.push_back(&avx512::decode_kernel);
+        if (runs_avx2()) list.push_back(&avx2::decode_kernel);
+#endif
+        list.push_back(&portable::decode_kernel);
+        list.push_back(nullptr);
+        return list;
+    }();
+    return found.data();
+}
+
+bool Scattered::find(const Decoder& decoder, std::int64_t begin, Points& points) const {
+    std::uint32_t largest = 0;
+    for (int k = 0; k < CORNERS; ++k) {
+        const std::int32_t* const from = rows + k * count + begin;
+        for (int i = 0; i < points.count; ++i) {
+            points.corners[k][i] = from[i];
+            largest = std::max(largest, std::uint32_t(from[i]));
+        }
+    }
+    for (int i = 0; i < points.count; ++i)
+        share_out(fractions + 3 * (begin + i), &points.shares[0][i], BLOCK);
+    return std::int64_t(largest) <= decoder.cells;
+}
+
+Subdivided::Subdivided(const std::int32_t* chosen_cells, std::int64_t cells,
+                       const std::int32_t* neighbours_of, int factor)
+    : PointSource(cells * factor * factor * factor),
+      chosen(chosen_cells),
+      neighbours(neighbours_of),
+      parts(factor * factor * factor) {
+    for (int part = 0; part < parts; ++part) {
+        const int place[] = {part / (factor * factor), part / factor % factor, part % factor};
+        float fraction[3];
+        int first = 0;  // neighbour at the first corner
+        for (int axis = 0; axis < 3; ++axis) {
+            const int twice = 2 * place[axis] + 1 - factor;  // from the centre, in 1/2 parts
+            first = 3 * first + (twice < 0 ? 0 : 1);
+            const double from_centre = twice / (2.0 * factor);
+            fraction[axis] = float(twice < 0 ? from_centre + 1 : from_centre);
+        }
+        for (int k = 0; k < CORNERS; ++k)
+            offsets[part][k] = std::int8_t(first + (k >> 2) * 9 + (k >> 1 & 1) * 3 + (k & 1));
+        share_out(fraction, shares[part], 1);
+    }
+}
+
+bool Subdivided::find(const Decoder& decoder, std::int64_t begin, Points& points) const {
+    std::uint32_t largest = 0;
+    std::int64_t at = begin / parts;
+    int part = int(begin % parts);
+    for (int i = 0; i < points.count; ++i) {
+        const std::int32_t cell = chosen[at];
+        if (cell < 0 || cell >= decoder.cells) return false;
+        for (int k = 0; k < CORNERS; ++k) {
+            const std::int32_t row = neighbours[offsets[part][k] * decoder.cells + cell];
+            points.corners[k][i] = row;
+            points.shares[k][i] = shares[part][k];
+            largest = std::max(largest, std::uint32_t(row));
+        }
+        if (++part == parts) {
+            part = 0;
+            ++at;
+        }
+    }
+    return std::int64_t(largest) <= decoder.cells;
+}
+
+bool decode(const DecodeKernel& kernel, const Decoder& decoder, const PointSource& source,
+            float* out, int threads) {
+    const DecodeSizes sizes = kernel.sizes(decoder);
+    const Ranges ranges(source.count);
+    threads = std::max(1, std::min(threads, ranges.count));
+    Floats packed(sizes.packed);
+    kernel.pack(decoder, packed.data());
+    std::vector<Floats> scratch;
+    for (int t = 0; t < threads; ++t) scratch.emplace_back(sizes.scratch);
+    std::atomic<bool> valid = true;
+
+    Crew::of_process().run(ranges.count, threads, [&](int range, int worker) {
+        const auto visit = [&](std::int64_t begin, const Points& points) {
+            kernel.forward(decoder, packed.data(), points, scratch[worker].data(),
+                           out + begin * SHOWN);
+        };
+        if (!each_block(decoder, source, ranges.begin(range), ranges.end(range), visit))
+            valid = false;
+    });
+    return valid;
+}
+
+bool decode_backward(const DecodeKernel& kernel, const Decoder& decoder, const PointSource& source,
+                     const float* gradient, const DecodeGradients& to, int threads) {
+    const DecodeSizes sizes = kernel.sizes(decoder);
+    const Ranges ranges(source.count), owners(decoder.cells);
+    const int channels = decoder.channels;
+    threads = std::max(1, std::min(threads, std::max(ranges.count, owners.count)));
+    Floats packed(sizes.packed);
+    kernel.pack(decoder, packed.data());
+    std::vector<Floats> scratch;
+    std::vector<Gathering> gatherings;
+    for (int t = 0; t < std::max(1, std::min(threads, ranges.count)); ++t) {
+        scratch.emplace_back(sizes.scratch);
+        gatherings.emplace_back(decoder, sizes.channels);
+    }
+    Floats weights(std::max(1, ranges.count) * sizes.gradient);
+    std::vector<Spill> spills(ranges.count);
+    std::atomic<bool> valid = true;
+    Crew& crew = Crew::of_process();
+
+    crew.run(ranges.count, threads, [&](int range, int worker) {
+        Gathering& gathering = gatherings[worker];
+        const auto visit = [&](std::int64_t begin, Points& points) {
+            gathering.give_slots(points);
+            kernel.backward(decoder, packed.data(), points, gradient + begin * SHOWN,
+                            scratch[worker].data(), weights.data() + range * sizes.gradient,
+                            gathering.sums());
+        };
+        if (!each_block(decoder, source, ranges.begin(range), ranges.end(range), visit))
+            valid = false;
+        spills[range] = gathering.finish(owners);
+    });
+    if (!valid) return false;
+
+    crew.run(owners.count, threads, [&](int owner, int) {
+        std::fill(to.state + owners.begin(owner) * channels, to.state + owners.end(owner) * channels,
+                  0.0f);
+        for (const Spill& spill : spills) spill.add_to(to.state, channels, owner);
+    });
+    std::fill_n(to.state + decoder.cells * channels, channels, 0.0f);
+
+    float* const total = weights.data();
+    for (int range = 1; range < ranges.count; ++range)
+        for (std::size_t i = 0; i < sizes.gradient; ++i)
+            total[i] += weights.data()[range * sizes.gradient + i];
+    for (int l = 0; l < LAYERS; ++l) {
+        const Layer& layer = decoder.layers[l];
+        const float* const from = total + sizes.begin[l];
+        for (int output = 0; output < layer.outputs; ++output) {
+            for (int input = 0; input < layer.inputs; ++input)
+                to.weights[l][std::int64_t(output) * layer.inputs + input] =
+                    from[input * sizes.width[l] + output];
+            to.biases[l][output] = from[layer.inputs * sizes.width[l] + output];
+        }
+    }
+    return true;
+}
+
+}  // namespace vnca

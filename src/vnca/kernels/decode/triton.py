@@ -1,0 +1,187 @@
+"""Decoding on NVIDIA GPUs in torch's automatic differentiation, computed by Triton kernels."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from vnca.errors import ShapeError
+from vnca.kernels.decode.weights import CORNERS, OUTPUTS, Weights
+from vnca.kernels.update.triton import LARGEST, OPTIONS, TYPES, Precision
+
+try:
+    import triton
+
+    from vnca.kernels.decode import triton_kernels
+except ImportError:  # as `vnca.kernels.update.triton.unavailable` says
+    triton: Any = None
+    triton_kernels: Any = None
+
+PROGRAMS = 4
+"""Programs for each multiprocessor; they take tiles of points in turns."""
+TILES = 64, 16, 64
+"""Points that a program works on at a time in the forward pass and in the network's gradient, and
+cells in the state's."""
+MOST_CHANNELS, MOST_UNITS = 32, 32
+"""What fits into a multiprocessor together with its gradient."""
+
+
+def decode(
+    state: Tensor,
+    rows: Tensor,
+    fractions: Tensor,
+    weights: Weights,
+    *,
+    precision: Precision | None = None,
+) -> Tensor:
+    """What is seen at points, as `vnca.kernels.decode.reference.decode` has it.
+
+    Differentiable, once, in the state and the weights. The backward pass computes the hidden layers
+    anew, and keeps C floats and 8 integers a point. The same bits in every run on one kind of GPU.
+
+    Args:
+        state: `[n + 1, C]`, float32, float16 or bfloat16; the last row is the outside, always
+            zero. All is computed in float32.
+        rows: `[8, m]` rows of the state around each point, z fastest, int32; n where nothing lives;
+            not checked.
+        fractions: `[m, 3]` of the way from the first of these cells to the last, 0 to 1.
+        weights: Of the network.
+        precision: Of the products; by default `tf32x3`, or `tf32` if torch is told that this is
+            enough (`torch.set_float32_matmul_precision`).
+
+    Returns:
+        `[m, 4]`, of the type of the state.
+
+    Raises:
+        ShapeError: If shapes or types are not as above, or too large.
+    """
+    _check(state, rows, fractions, weights)
+    if precision is None:
+        exact = torch.get_float32_matmul_precision() == "highest"
+        precision = "tf32x3" if exact else "tf32"
+    result = _Decode.apply(state, rows, fractions, *weights, precision)
+    assert isinstance(result, Tensor)
+    return result
+
+
+class _Decode(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, *inputs: Any) -> Tensor:
+        *tensors, ctx.precision = inputs
+        tensors = [tensor.contiguous() for tensor in tensors]
+        ctx.save_for_backward(*tensors)
+        state, _, fractions = tensors[:3]
+        points = len(fractions)
+        out = state.new_empty(points, OUTPUTS)
+        if points:
+            sizes = _sizes(tensors, TILES[0])
+            with torch.cuda.device_of(state):
+                triton_kernels.forward_kernel[(_programs(fractions, TILES[0]),)](
+                    *tensors, out, points, **sizes, PRECISION=ctx.precision, **OPTIONS
+                )
+        return out
+
+    @staticmethod
+    @once_differentiable
+    def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
+        ctx: Any, *grad_outputs: Tensor
+    ) -> tuple[Tensor | None, ...]:
+        gradient = grad_outputs[0].contiguous()
+        tensors = ctx.saved_tensors
+        state, rows, fractions, *weights = tensors
+        points, cells = len(fractions), len(state) - 1
+        sizes = _sizes(tensors, TILES[1])
+        programs = _programs(fractions, TILES[1])
+        lengths = [weight.numel() for weight in weights]
+        partials = state.new_empty((programs, sum(lengths)), dtype=torch.float32)
+        to_between = state.new_empty((points, state.shape[1]), dtype=torch.float32)
+        to_state = torch.zeros_like(state)
+        if points:
+            found, order = torch.sort(rows.flatten(), stable=True)
+            every = torch.arange(cells + 1, dtype=torch.int32, device=rows.device)
+            begin = torch.searchsorted(found, every, out_int32=True)
+            with torch.cuda.device_of(state):
+                triton_kernels.network_kernel[(programs,)](
+                    *tensors,
+                    gradient,
+                    to_between,
+                    partials,
+                    points,
+                    **sizes,
+                    PRECISION=ctx.precision,
+                    **OPTIONS,
+                )
+                triton_kernels.state_kernel[(triton.cdiv(cells + 1, TILES[2]),)](
+                    to_between,
+                    fractions,
+                    order.int(),
+                    begin,
+                    to_state,
+                    points,
+                    cells,
+                    sizes["C"],
+                    sizes["WIDTH"],
+                    TILES[2],
+                    **OPTIONS,
+                )
+        parts = partials.sum(0).split(lengths)
+        to_weights = (
+            (part.view(weight.shape[::-1]).t() if weight.ndim == 2 else part).to(weight.dtype)
+            for part, weight in zip(parts, weights, strict=True)
+        )
+        return to_state, None, None, *to_weights, None
+
+
+def _sizes(tensors: Sequence[Tensor], tile: int) -> dict[str, int]:
+    """What the kernels are compiled for."""
+    units, channels = tensors[3].shape
+    return {
+        "C": channels,
+        "H": units,
+        "WIDTH": max(16, triton.next_power_of_2(channels)),
+        "UNITS": max(16, triton.next_power_of_2(units)),
+        "TILE": tile,
+    }
+
+
+def _programs(fractions: Tensor, tile: int) -> int:
+    processors = 1
+    if fractions.device.type == "cuda":
+        processors = torch.cuda.get_device_properties(fractions.device).multi_processor_count
+    return min(triton.cdiv(len(fractions), tile), PROGRAMS * processors)
+
+
+def _check(state: Tensor, rows: Tensor, fractions: Tensor, weights: Weights) -> None:
+    """Everything but the values of rows, which the CPU does not know."""
+    n, c = state.shape if state.ndim == 2 else (0, 0)
+    m, units = (t.shape[0] if t.ndim else 0 for t in (fractions, weights.first))
+    shapes = {
+        "state": (state, (n, c)),
+        "rows": (rows, (CORNERS, m)),
+        "fractions": (fractions, (m, 3)),
+    }
+    named = zip(Weights._fields, weights, Weights.shapes(c, units), strict=True)
+    shapes |= {name.replace("_", " "): (weight, shape) for name, weight, shape in named}
+    for name, (tensor, shape) in shapes.items():
+        indices = name == "rows"
+        if tuple(tensor.shape) != shape:
+            problem = f"expected shape {shape}, got {tuple(tensor.shape)}"
+        elif tensor.dtype not in ((torch.int32,) if indices else TYPES):
+            problem = f"expected {'int32' if indices else 'float32 or shorter'}, got {tensor.dtype}"
+        elif tensor.device != state.device:
+            problem = f"expected on {state.device} like the state, got {tensor.device}"
+        else:
+            continue
+        raise ShapeError(f"decoding: {name}: {problem}")
+    if not (OUTPUTS <= c <= MOST_CHANNELS and 1 <= units <= MOST_UNITS and n >= 1):
+        raise ShapeError(
+            f"decoding: {n} rows of {c} channels, {units} units: the Triton kernels work with at "
+            f"least 1 row of {OUTPUTS} to {MOST_CHANNELS} channels and 1 to {MOST_UNITS} units"
+        )
+    if max(CORNERS, c) * m > LARGEST or n * c > LARGEST:
+        raise ShapeError(
+            f"decoding: {m} points, {n} rows of {c} channels: too many for the 32-bit offsets of "
+            "the Triton kernels"
+        )

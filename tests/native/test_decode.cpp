@@ -1,0 +1,287 @@
+// Native decoding without Python: held to a scalar one in double precision on odd shapes, to the
+// same bits whatever the number of threads, and to what it promises where something is wrong. Made
+// to be run under sanitizers (`make sanitize`): arrays are exactly as large as it is told.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "decode.hpp"
+
+using namespace vnca;
+
+namespace {
+
+constexpr int THREADS[] = {1, 2, 3, 8};
+
+void expect(bool holds, const std::string& what) {
+    if (holds) return;
+    std::fprintf(stderr, "failed: %s\n", what.c_str());
+    std::exit(1);
+}
+
+// ---- Problems --------------------------------------------------------------------------------
+
+struct Case {
+    const char* name;
+    std::int64_t points, cells;
+    int channels, units;
+    float frequency = 3;  // of the first layer; high ones leave the range of the polynomials
+};
+
+constexpr Case CASES[] = {
+    {"one point", 1, 1, 4, 7},
+    {"odd", 301, 77, 5, 17},
+    {"several ranges", 4100, 2100, 12, 32},
+    {"no point", 0, 10, 12, 32},
+    {"no cell", 60, 0, 12, 32},
+    {"wide", 97, 30, 64, 128},
+    {"many channels", 49, 300, 20, 40},
+    {"far out", 100, 50, 12, 16, 1e6f},
+};
+
+struct Problem {
+    Case of;
+    std::vector<std::int32_t> rows;
+    std::vector<float> state, fractions, gradient, weights[LAYERS], biases[LAYERS];
+
+    explicit Problem(const Case& c) : of(c) {
+        std::mt19937 random(7);
+        std::normal_distribution<float> normal;
+        const auto draw = [&](std::size_t size, float scale) {
+            std::vector<float> values(size);
+            for (float& value : values) value = scale * normal(random);
+            return values;
+        };
+        state = draw((c.cells + 1) * c.channels, 0.5f);
+        std::fill(state.end() - c.channels, state.end(), 0.0f);
+        rows.resize(CORNERS * c.points);
+        for (std::int32_t& row : rows) row = std::int32_t(random() % (c.cells + 1));
+        fractions.resize(3 * c.points);
+        for (float& fraction : fractions) fraction = float(random() % 1025) / 1024;
+        gradient = draw(c.points * SHOWN, 1);
+        for (int l = 0; l < LAYERS; ++l) {
+            const Layer size = layer(l);
+            const float scale = (l == 0 ? c.frequency : 1) / std::sqrt(float(size.inputs));
+            weights[l] = draw(std::size_t(size.outputs) * size.inputs, scale);
+            biases[l] = draw(size.outputs, 1);
+        }
+    }
+
+    Layer layer(int l) const {
+        return {l == 0 ? of.channels : of.units, l == LAYERS - 1 ? SHOWN : of.units,
+                weights[l].data(), biases[l].data()};
+    }
+
+    Decoder decoder() const {
+        return {of.cells, of.channels, state.data(), {layer(0), layer(1), layer(2), layer(3)}};
+    }
+
+    Scattered source() const { return {rows.data(), fractions.data(), of.points}; }
+};
+
+template <class Real>
+struct Results {
+    std::vector<Real> seen, to_state, to_weights[LAYERS], to_biases[LAYERS];
+
+    Results(const Problem& p, Real value)
+        : seen(p.gradient.size(), value), to_state(p.state.size(), value) {
+        for (int l = 0; l < LAYERS; ++l) {
+            to_weights[l].assign(p.weights[l].size(), value);
+            to_biases[l].assign(p.biases[l].size(), value);
+        }
+    }
+
+    bool operator==(const Results&) const = default;
+};
+
+// ---- Decoding, as its equations have it ------------------------------------------------------
+
+Results<double> exact(const Problem& p) {
+    const Decoder d = p.decoder();
+    const std::int64_t channels = d.channels;
+    Results<double> result(p, 0);
+    for (std::int64_t point = 0; point < p.of.points; ++point) {
+        double shares[CORNERS];
+        std::vector<double> inputs[LAYERS + 1], cosines[LAYERS];
+        inputs[0].assign(channels, 0);
+        for (int k = 0; k < CORNERS; ++k) {
+            shares[k] = 1;
+            for (int axis = 0; axis < 3; ++axis) {
+                const double fraction = p.fractions[3 * point + axis];
+                shares[k] *= k >> (2 - axis) & 1 ? fraction : 1 - fraction;
+            }
+            for (int c = 0; c < channels; ++c)
+                inputs[0][c] +=
+                    shares[k] * p.state[p.rows[k * p.of.points + point] * channels + c];
+        }
+        for (int l = 0; l < LAYERS; ++l)
+            for (int o = 0; o < d.layers[l].outputs; ++o) {
+                double sum = p.biases[l][o];
+                for (int i = 0; i < d.layers[l].inputs; ++i)
+                    sum += p.weights[l][o * d.layers[l].inputs + i] * inputs[l][i];
+                inputs[l + 1].push_back(l < LAYERS - 1 ? std::sin(sum) : sum + inputs[0][o]);
+                cosines[l].push_back(l < LAYERS - 1 ? std::cos(sum) : 1);
+            }
+        std::copy(inputs[LAYERS].begin(), inputs[LAYERS].end(), &result.seen[point * SHOWN]);
+
+        std::vector<double> to(p.gradient.begin() + point * SHOWN,
+                               p.gradient.begin() + (point + 1) * SHOWN);
+        for (int l = LAYERS - 1; l >= 0; --l) {
+            std::vector<double> to_inputs(d.layers[l].inputs, 0);
+            for (int o = 0; o < d.layers[l].outputs; ++o) {
+                const double to_sum = to[o] * cosines[l][o];
+                result.to_biases[l][o] += to_sum;
+                for (int i = 0; i < d.layers[l].inputs; ++i) {
+                    result.to_weights[l][o * d.layers[l].inputs + i] += to_sum * inputs[l][i];
+                    to_inputs[i] += to_sum * p.weights[l][o * d.layers[l].inputs + i];
+                }
+            }
+            to = to_inputs;
+        }
+        for (int c = 0; c < SHOWN; ++c) to[c] += p.gradient[point * SHOWN + c];
+        for (int k = 0; k < CORNERS; ++k)
+            for (int c = 0; c < channels; ++c)
+                result.to_state[p.rows[k * p.of.points + point] * channels + c] +=
+                    shares[k] * to[c];
+    }
+    std::fill(result.to_state.end() - channels, result.to_state.end(), 0);
+    return result;
+}
+
+// ---- Decoding under test ---------------------------------------------------------------------
+
+// Forward and backward, into arrays of other content; false if either says so.
+bool run(const DecodeKernel& kernel, const Problem& p, int threads, Results<float>& to) {
+    to = Results<float>(p, 1e30f);
+    const bool valid = decode(kernel, p.decoder(), p.source(), to.seen.data(), threads);
+    DecodeGradients gradients;
+    gradients.state = to.to_state.data();
+    for (int l = 0; l < LAYERS; ++l) {
+        gradients.weights[l] = to.to_weights[l].data();
+        gradients.biases[l] = to.to_biases[l].data();
+    }
+    return decode_backward(kernel, p.decoder(), p.source(), p.gradient.data(), gradients,
+                           threads) && valid;
+}
+
+Results<float> results(const DecodeKernel& kernel, const Problem& p, int threads) {
+    Results<float> to(p, 0);
+    expect(run(kernel, p, threads, to), std::string(p.of.name) + ": a right problem is refused");
+    return to;
+}
+
+// The norm of the difference over the norm.
+double error(const std::vector<float>& got, const std::vector<double>& expected) {
+    double difference = 0, norm = 1e-30;
+    for (std::size_t i = 0; i < got.size(); ++i) {
+        difference += (got[i] - expected[i]) * (got[i] - expected[i]);
+        norm += expected[i] * expected[i];
+    }
+    return std::sqrt(difference / norm);
+}
+
+void test_agreement(const Problem& p) {
+    const Results<double> right = exact(p);
+    for (const DecodeKernel* const* kernel = decode_kernels(); *kernel != nullptr; ++kernel) {
+        const std::string where = std::string(p.of.name) + ", " + (*kernel)->name + ": ";
+        const Results<float> got = results(**kernel, p, 1);
+        const auto check = [&](const std::string& name, const auto& values, const auto& expected) {
+            const double off = error(values, expected);
+            expect(off <= 5e-6, where + name + " is off by " + std::to_string(off));
+        };
+        // Far out the sum itself is off by more than a period: only the bits are compared.
+        if (p.of.frequency < 100) {
+            check("what is seen", got.seen, right.seen);
+            check("gradient of the state", got.to_state, right.to_state);
+            for (int l = 0; l < LAYERS; ++l) {
+                check("gradient of weights", got.to_weights[l], right.to_weights[l]);
+                check("gradient of a bias", got.to_biases[l], right.to_biases[l]);
+            }
+        }
+        for (const int threads : THREADS)
+            expect(results(**kernel, p, threads) == got,
+                   where + "other bits with " + std::to_string(threads) + " threads");
+    }
+}
+
+void test_rows_out_of_range() {
+    Problem p(CASES[2]);
+    Results<float> ignored(p, 0);
+    for (const DecodeKernel* const* kernel = decode_kernels(); *kernel != nullptr; ++kernel)
+        for (const std::int64_t row : {std::int64_t(-1), p.of.cells + 1, std::int64_t(INT32_MAX)})
+            for (const int threads : THREADS) {
+                std::int32_t& entry = p.rows[5 * p.of.points + 3000];
+                const std::int32_t before = std::exchange(entry, std::int32_t(row));
+                expect(!run(**kernel, p, threads, ignored), "a row out of range is accepted");
+                entry = before;
+            }
+}
+
+// The parts of cells are points like others: those of a table whose entries are all different.
+void test_parts_of_cells() {
+    const Problem p({"parts", 0, 40, 12, 8});
+    std::vector<std::int32_t> neighbours(NEIGHBOURS * p.of.cells);
+    for (std::size_t i = 0; i < neighbours.size(); ++i)
+        neighbours[i] = std::int32_t(i * 7 % (p.of.cells + 1));
+    std::vector<std::int32_t> cells = {39, 0, 7};
+    for (int factor = 1; factor <= Subdivided::FINEST; ++factor) {
+        const Subdivided parts(cells.data(), std::int64_t(cells.size()), neighbours.data(), factor);
+        for (std::int64_t begin = 0; begin < parts.count; begin += BLOCK) {
+            Points points;
+            points.count = int(std::min<std::int64_t>(BLOCK, parts.count - begin));
+            expect(parts.find(p.decoder(), begin, points), "right cells are refused");
+            for (int i = 0; i < points.count; ++i) {
+                double total = 0;
+                for (int k = 0; k < CORNERS; ++k) total += points.shares[k][i];
+                expect(std::abs(total - 1) < 1e-6, "shares do not add up to one");
+            }
+        }
+        std::vector<float> alone(parts.count * SHOWN), together(parts.count * SHOWN);
+        for (const DecodeKernel* const* kernel = decode_kernels(); *kernel != nullptr; ++kernel) {
+            expect(decode(**kernel, p.decoder(), parts, alone.data(), 1), "cells are refused");
+            for (const int threads : THREADS) {
+                decode(**kernel, p.decoder(), parts, together.data(), threads);
+                expect(alone == together, "other bits with other threads");
+            }
+        }
+        for (const std::int32_t wrong : {-1, 40, INT32_MAX}) {
+            const std::int32_t before = std::exchange(cells.back(), wrong);
+            expect(!decode(**decode_kernels(), p.decoder(), parts, alone.data(), 2),
+                   "a cell out of range is accepted");
+            cells.back() = before;
+        }
+    }
+}
+
+void test_callers_at_the_same_time() {
+    const Problem p(CASES[2]);
+    const Results<float> alone = results(**decode_kernels(), p, 1);
+    std::vector<std::thread> callers;
+    for (int caller = 0; caller < 3; ++caller)
+        callers.emplace_back([&] {
+            for (const int threads : THREADS)
+                expect(results(**decode_kernels(), p, threads) == alone,
+                       "callers disturb each other");
+        });
+    for (std::thread& caller : callers) caller.join();
+}
+
+}  // namespace
+
+int main() {
+    for (const Case& c : CASES) test_agreement(Problem(c));
+    test_rows_out_of_range();
+    test_parts_of_cells();
+    test_callers_at_the_same_time();
+    std::printf("native decoding holds with");
+    for (const DecodeKernel* const* kernel = decode_kernels(); *kernel != nullptr; ++kernel)
+        std::printf(" %s", (*kernel)->name);
+    std::printf("\n");
+}

@@ -1,0 +1,64 @@
+"""What a rule is told of a frame: the same while it is trained and when it paints."""
+
+import dataclasses
+from functools import reduce
+
+import numpy as np
+import pytest
+
+from vnca.automaton.domain import DomainKind
+from vnca.errors import GridError
+from vnca.features.vgg import VGG16
+from vnca.stylize.config import StylizeConfig
+from vnca.stylize.roll import stylize
+from vnca.training.config import TrainConfig
+from vnca.training.smoke import smoke_trainer
+from vnca.typing import Box, FloatArray, IntArray
+from vnca.volume import Volume
+
+
+@pytest.mark.parametrize("kind", ["active", "box"])
+@pytest.mark.parametrize("shift", [0, 3])
+def test_the_frame_of_the_training_has_the_same_priors_in_a_painting(
+    tiny_smoke: Volume,
+    style: FloatArray,
+    tiny_config: TrainConfig,
+    vgg: VGG16,
+    kind: DomainKind,
+    shift: int,
+) -> None:
+    """As one of a sequence whose box is larger, and whose grid may begin elsewhere."""
+    config = dataclasses.replace(tiny_config.rule, position_prior=True, domain=kind)
+    config = dataclasses.replace(tiny_config, rule=config)
+    trainer = smoke_trainer(tiny_smoke, style, config, vgg)
+    trained, told = trainer.scene.domain, []
+    x, y, z = tiny_smoke.origin
+    matrix = tiny_smoke.index_to_world.copy()
+    matrix[:3, 3] += shift * matrix[:3, 2]
+    here = dataclasses.replace(tiny_smoke, origin=(x, y, z - shift), index_to_world=matrix)
+    higher = dataclasses.replace(here, origin=(x, y, z - shift + 5), frame=2)
+    box = reduce(Box.union, (smoke.box for smoke in (here, higher)))
+
+    def step(
+        state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
+    ) -> FloatArray:
+        del rows, neighbours
+        told.append(priors)
+        return state
+
+    frames = stylize([here, higher], trainer.rule(), step, StylizeConfig(warmup=0), box=box)
+    cells = next(frames).state.cells + np.array([0, 0, shift])
+    rows = {tuple(cell): row for row, cell in enumerate(cells.tolist())}
+    ours = [rows[tuple(cell)] for cell in trained.cells.tolist()]
+    np.testing.assert_array_equal(told[0][ours], trainer.scene.priors.numpy())
+    assert np.ptp(told[0][:, :3], axis=0).min() > 1.5
+
+
+def test_a_frame_of_sheared_cells_is_not_trained_on(
+    tiny_smoke: Volume, style: FloatArray, tiny_config: TrainConfig, vgg: VGG16
+) -> None:
+    matrix = tiny_smoke.index_to_world.copy()
+    matrix[0, 2] = 0.05
+    sheared = dataclasses.replace(tiny_smoke, index_to_world=matrix)
+    with pytest.raises(GridError, match="frame 1: its voxels are sheared"):
+        smoke_trainer(sheared, style, tiny_config, vgg)
