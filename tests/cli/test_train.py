@@ -132,8 +132,12 @@ def test_what_is_given_wins_over_the_preset_wherever_it_stands(
 
 
 def test_the_preset_is_written_down(trained: Run) -> None:
-    run = trained("run", "--preset", "paper", "--view.elevation", 7)
+    layers = ("--appearance.layers", "relu1_1")
+    run = trained("run", "--preset", "paper", "--view.elevation", 7, *layers)
     config = resolved(run)
+    # ImageNet's VGG16 where it was fetched before, which is not so here.
+    assert (config["config"]["features"], config["features"]) == ("vgg16", "edges")
+    assert config["config"]["appearance"]["style_scale"] == 1
     assert config["preset"] == "paper"
     assert config["config"]["view"]["mode"] == "paper"
     assert config["config"]["view"]["elevation"] == 7

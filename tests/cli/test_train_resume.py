@@ -216,7 +216,7 @@ def test_out_of_memory_while_training_is_one_line_and_loses_nothing(
     assert "Traceback" not in outcome.err
     *_, complaint = outcome.err.splitlines()
     assert complaint.startswith("vnca: out of memory in iteration 3: for 1328 cells")
-    assert "--view.size 32 about 8 MB" in complaint
+    assert "--view.size 32 about 7 MB" in complaint
     assert f"with a --memory-budget: vnca train --resume {run}" in complaint
     assert Model.load(run).training["iterations"] == 2
     assert vnca("train", "--resume", run).code == 0

@@ -73,19 +73,20 @@ def test_a_flat_picture_has_no_strokes_and_fills_a_view() -> None:
     assert picture_cells(flat, cells=50.0, pixels=96) == 50
 
 
-def test_strokes_span_three_cells() -> None:
-    cells = picture_cells(stripes(5), cells=64.0, pixels=96)
+def test_strokes_span_three_cells_where_cells_are_seen_finely() -> None:
+    cells = picture_cells(stripes(5), cells=32.0, pixels=128)
     assert 5 / SIZE * cells == pytest.approx(3, rel=0.15)
 
 
-def test_strokes_span_two_pixels_where_many_cells_share_one() -> None:
-    cells = picture_cells(stripes(5), cells=400.0, pixels=100)
-    assert 5 / SIZE * cells * 100 / 400 == pytest.approx(2, rel=0.15)
+@pytest.mark.parametrize("across", [64.0, 400.0])
+def test_strokes_span_four_pixels_where_they_are_not(across: float) -> None:
+    cells = picture_cells(stripes(5), cells=across, pixels=64)
+    assert 5 / SIZE * cells * 64 / across == pytest.approx(4, rel=0.15)
 
 
 def test_extremes_are_bounded() -> None:
-    assert picture_cells(stripes(2.5), cells=64.0, pixels=96) == pytest.approx(3 / FINEST)
-    assert picture_cells(stripes(24), cells=64.0, pixels=96) == pytest.approx(3 / COARSEST)
+    assert picture_cells(stripes(2.5), cells=32.0, pixels=128) == pytest.approx(3 / FINEST)
+    assert picture_cells(stripes(24), cells=32.0, pixels=128) == pytest.approx(3 / COARSEST)
 
 
 def test_a_picture_with_values_beyond_its_range_gives_a_number() -> None:

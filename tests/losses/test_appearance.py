@@ -230,7 +230,7 @@ def test_smaller_strokes_can_be_asked_for(network: FeatureNetwork, painting: Flo
 
 
 def test_the_scale_follows_the_strokes_unless_it_is_given(network: FeatureNetwork) -> None:
-    """Stripes of 4 pixels span three cells of two pixels each."""
+    """Stripes of 4 pixels span three cells of two pixels each, and four pixels at least."""
     bright = np.arange(96) // 4 % 2 == 0
     stripes = np.broadcast_to(np.where(bright, 0.8, 0.1)[:, None, None], (96, 96, 3))
     config = AppearanceConfig(layers=LAYERS[network.name])

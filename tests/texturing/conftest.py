@@ -32,7 +32,9 @@ def tiny_config() -> TextureConfig:
     plain: dict[str, Any] = {f"{name}_prior": False for name in ("position", "density", "velocity")}
     return TextureConfig(
         rule=RuleConfig(channels=6, hidden=16, **plain),
-        appearance=AppearanceConfig(samples=128, layers=("relu1_1", "relu2_1", "relu3_1")),
+        appearance=AppearanceConfig(
+            samples=128, layers=("relu1_1", "relu2_1", "relu3_1"), style_scale=1.0
+        ),
         slices=SliceConfig(size=32, count=1),
         block=16,
         iterations=3,

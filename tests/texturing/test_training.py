@@ -7,7 +7,9 @@ import pytest
 import torch
 
 from vnca.automaton.rule import DENSITY_CHANGE
+from vnca.features.load import load_network
 from vnca.features.vgg import VGG16
+from vnca.losses.appearance import AppearanceConfig
 from vnca.texturing.config import TextureConfig
 from vnca.texturing.training import texture_trainer
 from vnca.training.course import PoolConfig
@@ -45,6 +47,17 @@ def test_training_brings_slices_nearer_to_the_style(trainer: Make) -> None:
     )
     losses = [step.loss for step in learning.run()]
     assert np.median(losses[-10:]) < 0.85 * losses[0]
+
+
+@pytest.mark.parametrize("source", ["efficientnet", "edges"])
+def test_any_network_teaches(style: FloatArray, tiny_config: TextureConfig, source: str) -> None:
+    """With the layers and the scale that it and the picture choose."""
+    config = replace(tiny_config, appearance=AppearanceConfig(samples=128))
+    learning = texture_trainer(style, config, load_network(source))
+    before = weights(learning)
+    assert all(np.isfinite(step.loss) for step in learning.run())
+    assert not np.array_equal(before[2], weights(learning)[2])
+    assert learning.picture_cells == learning.style_scale * config.slices.size
 
 
 def test_same_seed_same_weights_and_another_seed_others(trainer: Make) -> None:

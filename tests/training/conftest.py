@@ -31,7 +31,9 @@ def tiny_config() -> TrainConfig:
     return TrainConfig(
         rule=RuleConfig(channels=6, hidden=16, position_prior=False),
         view=ViewConfig(size=32),
-        appearance=AppearanceConfig(samples=128, layers=("relu1_1", "relu2_1", "relu3_1")),
+        appearance=AppearanceConfig(
+            samples=128, layers=("relu1_1", "relu2_1", "relu3_1"), style_scale=1.0
+        ),
         iterations=3,
         rate_warmup=0,
         shortest_rollout=2,

@@ -121,7 +121,7 @@ class Session:
                 f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
                 f"features '{self.training['features']}', {self.training['device']}"
             )
-            chosen = "" if trainer.config.appearance.style_scale else ", for strokes of three"
+            chosen = "" if trainer.config.appearance.style_scale else ", chosen by its strokes"
             say(
                 f"the picture is {trainer.picture_cells:.0f} cells wide{chosen} "
                 f"(--appearance.style-scale {trainer.style_scale:.2f})"

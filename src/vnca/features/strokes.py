@@ -17,8 +17,8 @@ from vnca.typing import AnyArray, BoolArray, FloatArray
 
 STROKE_CELLS = 3.0
 """Cells that a stroke spans."""
-STROKE_PIXELS = 2.0
-"""Pixels that it spans at least: what is smaller cannot be compared."""
+STROKE_PIXELS = 4.0
+"""Pixels that it spans at least: the finer marks in it are a quarter as wide."""
 FINEST, COARSEST = 3 / 128, 3 / 48
 """Relative to the picture's shorter side: what is finer or coarser is taken for this. A picture of
 finer strokes would be far larger than a block, one of coarser ones would have too few cells."""
@@ -60,7 +60,7 @@ def stroke_width(picture: FloatArray) -> float | None:
 def picture_cells(picture: FloatArray, cells: float, pixels: int) -> float:
     """Cells along the shorter side at which a picture is best shown.
 
-    Its strokes then span three cells, and two pixels at least. A flat picture has none to span
+    Its strokes then span three cells, and four pixels at least. A flat picture has none to span
     anything: it is shown once in a view.
 
     Args:

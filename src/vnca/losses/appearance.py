@@ -44,7 +44,7 @@ class AppearanceConfig:
     """Positions drawn in each layer for style matching, from either picture."""
     style_scale: float | None = None
     """Shorter side of the style image relative to the view: below 1 shrinks the brush strokes.
-    Chosen so that a stroke of the picture spans three cells unless given."""
+    Chosen so that a stroke of the picture spans three cells, and four pixels, unless given."""
     opacity_threshold: float = 0.6
     """Compare only where the smoke is at least this opaque."""
 
