@@ -15,6 +15,7 @@ import tyro
 from vnca.cli.help import SHORT, help_text
 from vnca.cli.progress import as_options, end_line
 from vnca.core.errors import OptionError
+from vnca.engine.backend import backend_named
 
 T = TypeVar("T")
 STDOUT = Path("-")
@@ -54,6 +55,9 @@ def parse(
         )
         print(shown)
         raise SystemExit(0)
+    backend = chosen(arguments, "--backend", "auto")
+    if backend != "auto":
+        backend_named(backend)  # Else told once files were read.
     complaint = io.StringIO()
     try:
         with redirect_stderr(complaint):
