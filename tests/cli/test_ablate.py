@@ -43,6 +43,7 @@ def test_the_velocity_ablation_trains_and_compares_three_kinds(
     before = (tmp_path / "runs" / "both-0" / "model.safetensors").stat().st_mtime_ns
     again = vnca(*arguments)
     assert again.out == outcome.out
+    assert json.loads(vnca(*arguments, "--json", "-").out) == measures
     assert (tmp_path / "runs" / "both-0" / "model.safetensors").stat().st_mtime_ns == before
 
 

@@ -113,8 +113,10 @@ def test_smoke_without_velocity_is_measured_as_far_as_it_goes(
     vnca: Vnca, model: Path, smoke: Path, style: Path, tmp_path: Path
 ) -> None:
     options = ("--velocity-grid", "none", "--out", tmp_path, "--style", style, *SMALL)
-    assert vnca("evaluate", model, smoke, *options).code == 0
+    outcome = vnca("evaluate", model, smoke, *options, "--json")
+    assert outcome.code == 0
     measures = json.loads((tmp_path / "report.json").read_text())
+    assert json.loads(outcome.out) == measures
     unknown = {name for name, measure in measures.items() if measure["value"] is None}
     assert unknown == {
         *("time.warp_short", "time.warp_long"),
