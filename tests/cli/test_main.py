@@ -13,7 +13,7 @@ Vnca = Callable[..., Any]
 
 
 def test_help_lists_every_command(vnca: Vnca) -> None:
-    for arguments in (["--help"], ["-h"], ["help"], []):
+    for arguments in (["--help"], ["--help-all"], ["-h"], ["help"], []):
         outcome = vnca(*arguments)
         assert outcome.code == (0 if arguments else 2)
         assert all(command in outcome.out for command in COMMANDS)

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 import vnca
-from vnca.cli.help import JSON_PROGRESS
+from vnca.cli.help import ASKED, JSON_PROGRESS
 from vnca.cli.options import spelled_out
 from vnca.cli.progress import as_options, end_line, event, json_events
 from vnca.cli.subcommands import usage
@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _call(arguments: Sequence[str]) -> int:
-    if not arguments or arguments[0] in ("-h", "--help", "help"):
+    if not arguments or arguments[0] in (*ASKED, "help"):
         print(usage("vnca", "Turn smoke simulations into moving paintings.", COMMANDS))
         return 0 if arguments else 2
     name, *rest = arguments

@@ -14,7 +14,7 @@ from vnca.cli.bench_options import Tables, parse_bench, short
 class Step(Tables):
     """Time one step of the automaton in every backend, in turns, in one run.
 
-    Times are per living cell. GFLOP/s count the matrix products that are needed, the same for
+    Times are per active cell. GFLOP/s count the matrix products that are needed, the same for
     every backend. If backends disagree with the reference in float64, nothing is timed.
     """
 
@@ -49,7 +49,7 @@ def _table(run: StepRun) -> list[str]:
     to_state, to_gradients = TOLERANCES[run.dtype]
     lines = [
         "",
-        f"{run.dtype}, {first['grid']} cells, {first['occupancy']:.1%} alive, hidden "
+        f"{run.dtype}, {first['grid']} cells, {first['occupancy']:.1%} active, hidden "
         f"{first['hidden']}",
         f"peaks: GEMM {run.gemm_gflops:.1f} GFLOP/s, copy {run.copy_gbs:.1f} GB/s",
         f"all agree with the reference in float64: states to {to_state:.0e}, gradients to "

@@ -120,7 +120,7 @@ def _painted(options: BenchStylize, folder: Path) -> PaintedSequence:
 def _table(rows: Rows) -> list[str]:
     first = rows[0]
     lines = [
-        f"{first['frames']} frames in {first['grid']} cells, {first['cells']} alive, "
+        f"{first['frames']} frames in {first['grid']} cells, {first['cells']} active, "
         f"{first['steps']} steps a frame, hidden {first['hidden']}",
         "all agree on the first frame",
         f"{'backend':10}{'dtype':10}{'':12}{'seconds a frame (min to max)':>32}{'frames/s':>10}"

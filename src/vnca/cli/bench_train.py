@@ -135,7 +135,7 @@ def _style(options: BenchTrain) -> FloatArray:
 def _table(rows: Rows) -> list[str]:
     first = rows[0]
     lines = [
-        f"{first['preset']}: {first['cells']} cells alive in {first['grid']}, hidden "
+        f"{first['preset']}: {first['cells']} active cells in {first['grid']}, hidden "
         f"{first['hidden']}, {first['rollout']} steps a rollout, views of {first['view']}²",
         "all come to the same loss",
         f"{'backend':10}{'seconds an iteration (min to max)':>36}{'MB':>10}{'against plain':>15}",

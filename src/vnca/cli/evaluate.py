@@ -82,7 +82,7 @@ class Evaluate:
 
 
 def run(arguments: Sequence[str]) -> None:
-    """Read the options and measure; smoke is read as it was for training unless told otherwise."""
+    """Read the options and measure; smoke is read as for training unless options say otherwise."""
     options = parse("evaluate", Evaluate, arguments)
     model = Model.load(options.run)
     smoke = recorded_smoke(options.run, model)

@@ -106,7 +106,7 @@ class Film:
             OutputError: If the film cannot be written.
         """
         try:
-            import vnca.rendering.view  # noqa: F401  A missing torch is best told before long work.
+            import vnca.rendering.view  # noqa: F401  A missing torch is reported before long work.
         except ModuleNotFoundError as error:
             raise BackendUnavailableError(
                 f"films need {error.name}: pip install 'vnca[train]'"

@@ -23,6 +23,8 @@ SHORT = {
     "-d": "--device",
 }
 """Short forms, the same in every command that has the option."""
+ASKED = ("-h", "--help", "--help-all")
+"""What asks for help."""
 _SMOKE = ("velocity-units", "fps", "up-axis")
 _FILM = ("film.azimuth", "film.elevation", "film.turn", "film.rows", "film.columns", "film.fps")
 COMMON: Mapping[str, tuple[str, ...]] = {
@@ -87,8 +89,8 @@ class Option:
             forms += f", --{before}{'.' * bool(before)}no-{last}"
         return f"{forms} {self.form}".rstrip()
 
-    def told(self) -> str:
-        """What is said of it."""
+    def described(self) -> str:
+        """What it does, and its default."""
         note = f"default: {self.default}" if self.default else ""
         note = "required" if self.is_required else note
         return f"{self.text} ({note})" if note and not self.is_positional else self.text
@@ -163,7 +165,7 @@ def _meant(option: Option, names: Collection[str]) -> str:
                 return f"--{known}"
         return found[0]
 
-    return re.sub(r"`([a-z_.]+)`", written, option.told())
+    return re.sub(r"`([a-z_.]+)`", written, option.described())
 
 
 def _options(

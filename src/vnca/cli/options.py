@@ -12,7 +12,7 @@ from typing import Any, TypeVar, cast
 
 import tyro
 
-from vnca.cli.help import SHORT, help_text
+from vnca.cli.help import ASKED, SHORT, help_text
 from vnca.cli.progress import as_options, end_line
 from vnca.core.errors import OptionError
 from vnca.engine.backend import backend_named
@@ -45,7 +45,7 @@ def parse(
         OptionError: If an option is unknown, missing or malformed.
         SystemExit: If help was asked for; it is printed.
     """
-    if {"-h", "--help", "--help-all"}.intersection(arguments):
+    if set(ASKED).intersection(arguments):
         shown = help_text(
             command,
             cast("type", options),
@@ -57,7 +57,7 @@ def parse(
         raise SystemExit(0)
     backend = chosen(arguments, "--backend", "auto")
     if backend != "auto":
-        backend_named(backend)  # Else told once files were read.
+        backend_named(backend)  # Reported before any file is read.
     complaint = io.StringIO()
     try:
         with redirect_stderr(complaint):

@@ -1,4 +1,4 @@
-"""A sequence of smoke as the subcommands see it: frames, gaps told, box, volumes read ahead."""
+"""A sequence of smoke as the commands see it: frames, gaps, box, volumes read ahead."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,7 +25,7 @@ from vnca.rule.rule import SMOKE_THRESHOLD, Rule, density_scale
 
 
 def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
-    """The frames of a pattern; gaps and sub-frames are told on standard error.
+    """The frames of a pattern; gaps and sub-frames are mentioned on standard error.
 
     Raises:
         SequenceError: If there are none.
@@ -40,7 +40,7 @@ def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
 
 
 def read_alone(path: Path, smoke: SmokeFormat) -> Volume:
-    """A frame on a lattice of its own; if its voxels are not those cells, that is told.
+    """A frame on a lattice of its own; if its voxels are not those cells, a note says so.
 
     Raises:
         VncaError: If it cannot be read, or can have no place on a lattice.
@@ -77,8 +77,8 @@ def sequence_region(
 ) -> Region:
     """The lattice of a sequence, and the box in it that holds the smoke of all frames.
 
-    The lattice is that of the first frame with smoke. That others are interpolated to its cells is
-    told. Files' headers are read, where they tell.
+    The lattice is that of the first frame with smoke; a note says so where others are interpolated
+    to its cells. Only headers are read, where the files have what it takes in them.
 
     Args:
         sequence: The frames.
@@ -199,7 +199,8 @@ def _without_smoke(sequence: FrameSequence) -> SequenceError:
 def placed(rule: Rule, region: Region) -> Rule:
     """A rule as it is for a region: apart from where it was trained, that has positions of its own.
 
-    A rule that tells cells their position would else tell all of them the same; it is told.
+    A rule that is conditioned on position would else see the same position in all cells; a note
+    says so.
     """
     if rule.place is None or not rule.config.position_prior:
         return rule
@@ -211,8 +212,8 @@ def placed(rule: Rule, region: Region) -> Rule:
     if (corners.max(axis=0) > lower).all() and (corners.min(axis=0) < upper).all():
         return rule
     say(
-        "the smoke lies apart from where the rule was trained, which tells cells their position: "
-        "they are told that in the box of this sequence"
+        "the smoke lies apart from where the rule was trained; positions, on which "
+        "the rule is conditioned, are those in the box of this sequence"
     )
     return replace(rule, place=None)
 

@@ -62,7 +62,7 @@ class Stylize:
     """Paint on a grid so many times as fine as that of the smoke."""
     gamma: float | None = None
     """Extinction of density 1, per cell of the smoke, with which the painting is to be seen:
-    brightness without training again. It is told in the files."""
+    brightness without training again. The files record it."""
     density_scale: float | None = None
     """Density that counts as 1; that of the training frame unless given."""
     backend: str = "auto"
@@ -99,7 +99,7 @@ class Stylize:
 
 
 def run(arguments: Sequence[str]) -> None:
-    """Read the options and paint; smoke is read as it was for training unless told otherwise."""
+    """Read the options and paint; smoke is read as for training unless options say otherwise."""
     options = parse("stylize", Stylize, arguments)
     model = Model.load(options.model)
     smoke = recorded_smoke(options.model, model)

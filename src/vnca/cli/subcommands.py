@@ -3,6 +3,7 @@
 import importlib
 from collections.abc import Mapping, Sequence
 
+from vnca.cli.help import ASKED
 from vnca.core.errors import OptionError
 
 Commands = Mapping[str, str]
@@ -24,7 +25,7 @@ def run_subcommand(
         OptionError: If there is none of that name.
     """
     name, rest = (arguments[0], arguments[1:]) if arguments else ("", ())
-    if name in ("-h", "--help"):
+    if name in ASKED:
         print(usage(f"vnca {command}", purpose, commands))
         return
     if name not in commands:

@@ -24,7 +24,7 @@ from vnca.rule.rule import Rule
 
 SUFFIXES = (".glb", ".ply")
 MANY_FACES = 200_000
-"""From here on the user is told that unwrapping takes long."""
+"""From here on a note says that unwrapping takes long."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Bake:
     scale: float = 1.0
     """How often the block repeats along the longest side of the mesh."""
     animate: int = 0
-    """Write so many pictures of the living texture beside the mesh, as OUT_0001.png and so on."""
+    """Write so many pictures of the texture as it changes beside the mesh: OUT_0001.png and on."""
     unwrap: Unwrap = "auto"
     """Make UVs: auto keeps those there where they can be used, never insists on them."""
     up_axis: UpAxis | None = None

@@ -27,7 +27,7 @@ class BlockConfig:
     steps: int = 96
     """Steps of the automaton from nothing to the texture."""
     steps_per_frame: int | None = None
-    """Steps between two pictures of a living texture; the rule's own pace unless given."""
+    """Steps between two pictures of a texture that changes; the rule's own pace unless given."""
     seed: int = 0
     """Same seed, same machine, same block."""
     backend: str = "auto"

@@ -32,7 +32,7 @@ class TurntableOptions:
     out: Path
     """A film (mp4, gif, webp), or a picture (png, jpg) of its beginning."""
     model: Path | None = None
-    """Show the solid texture of this model, alive, instead of the texture in the file."""
+    """Show the solid texture of this model as it changes, instead of the texture in the file."""
     scale: float = 1.0
     """With --model: how often the block repeats along the longest side of the mesh."""
     up_axis: UpAxis | None = None
@@ -65,10 +65,10 @@ def run(arguments: Sequence[str]) -> None:
         write_image(options.out, *(table.picture(*shown) for shown in shaders))
     else:
         with FilmWriter(options.out, options.film.fps) as film:
-            # A living texture tells of its own progress.
-            living = options.model is not None and options.grow.steps_per_frame != 0
+            # One that goes on changing shows its own progress.
+            is_changing = options.model is not None and options.grow.steps_per_frame != 0
             for frame, shader in (
-                shaders if living else tracked(shaders, "filming", frames, "frames")
+                shaders if is_changing else tracked(shaders, "filming", frames, "frames")
             ):
                 film.add(table.picture(frame, shader))
     made("film", options.out)
