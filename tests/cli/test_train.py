@@ -96,7 +96,7 @@ def flags(config: Any, prefix: str = "") -> list[str]:
 
 
 def test_every_hyperparameter_is_an_option(vnca: Vnca) -> None:
-    outcome = vnca("train", "--help")
+    outcome = vnca("train", "--help-all")
     assert outcome.code == 0
     words = outcome.out.replace(",", " ").split()
     missing = [flag for flag in flags(SmokeConfig()) if flag not in words]

@@ -113,7 +113,7 @@ def help_text(
     positional = [option for option in options if option.is_positional]
     named = [option for option in options if not option.is_positional]
     # Not of the dataclass where a command has two, as that of going on with a training.
-    common = [name for name in COMMON.get(command, ()) if name in names]
+    common = [name for name in COMMON.get(command, ()) if names.issuperset(COMMON[command])]
     shown = sorted(named, key=lambda option: _rank(option.name, common))
     if common and not all_of_them:
         shown = [option for option in shown if option.name in common]
