@@ -352,11 +352,11 @@ def test_a_run_that_is_there_already(vnca: Vnca, frame: Path, style: Path, model
 
 def test_a_model_of_a_newer_format(vnca: Vnca, smoke: Path, model: Path, out: Path) -> None:
     path = model / MODEL_NAME
-    described = {"format_version": 2, "version": "9.0", "rule": {}, "scales": {}, "training": {}}
+    described = {"format_version": 3, "version": "9.0", "rule": {}, "scales": {}, "training": {}}
     save_file(load_file(path), path, metadata={"vnca": json.dumps(described)})
     for arguments in (["stylize", model, smoke, "--out", out], ["info", model]):
         complaint = vnca(*arguments).complaint
-        assert f"{path}: model format 2 is newer" in complaint
+        assert f"{path}: model format 3 is newer" in complaint
         assert "upgrade vnca" in complaint
 
 
