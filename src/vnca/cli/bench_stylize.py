@@ -99,8 +99,8 @@ def bench_stylize(options: BenchStylize) -> None:
             repeats=options.repeats,
             precision=options.precision,
         )
-    print("{device}, {threads} threads, vnca {vnca}".format(**facts))
-    print("\n".join(_table(rows)))
+    options.print("{device}, {threads} threads, vnca {vnca}".format(**facts))
+    options.print("\n".join(_table(rows)))
     options.keep(facts, rows)
 
 

@@ -1,4 +1,4 @@
-"""`vnca evaluate RUN [SEQUENCE]`, and `vnca evaluate FRAME STYLE --ablation velocity --out DIR`."""
+"""`vnca evaluate RUN [SEQUENCE]`."""
 
 import dataclasses
 import json
@@ -12,8 +12,8 @@ import tyro
 
 import vnca
 from vnca.bench.machine import run_facts
-from vnca.cli.options import is_given, parse, say
-from vnca.cli.progress import tracked
+from vnca.cli.options import parse, print_json, say
+from vnca.cli.progress import made, tracked
 from vnca.cli.recorded import PICTURE_CELLS, recorded_smoke
 from vnca.cli.sequence import open_sequence, placed, sequence_region, volumes
 from vnca.core.errors import BackendUnavailableError, OptionError
@@ -46,11 +46,7 @@ JUDGES = ("edges", "efficientnet")
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measure how well a trained rule paints a sequence, and write a report with pictures.
-
-    `vnca evaluate FRAME STYLE --ablation velocity --out DIR` trains with and without a part of
-    the method instead, and compares how their textures move.
-    """
+    """Measure how well a trained rule paints a sequence, and write a report with pictures."""
 
     run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RUN")]
     """A model file, or the folder of a training run."""
@@ -69,6 +65,8 @@ class Evaluate:
     """Paint on a grid so many times as fine as that of the smoke."""
     size: int = SIZE
     """Rows and columns of the views, pixels."""
+    json: bool = False
+    """Print the measures as JSON, as in report.json, instead of a table."""
     backend: str = "auto"
     """What computes the automaton."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
@@ -86,11 +84,6 @@ class Evaluate:
 
 def run(arguments: Sequence[str]) -> None:
     """Read the options and measure; smoke is read as it was for training unless told otherwise."""
-    if is_given(arguments, "--ablation"):
-        from vnca.cli import evaluate_ablation
-
-        evaluate_ablation.run(arguments)
-        return
     options = parse("evaluate", Evaluate, arguments)
     model = Model.load(options.run)
     smoke = recorded_smoke(options.run, model)
@@ -145,14 +138,17 @@ def evaluate(options: Evaluate, model: Model) -> None:
         + (f", painted on a grid {refine} times as fine" if refine > 1 else ""),
     }
     listed = measures(found)
+    described = {measure.name: measure.as_json() for measure in listed}
     with whole_file(out / REPORT_NAME) as temporary:
         temporary.write_text(report(found, listed, picture, facts), encoding="utf-8")
     with whole_file(out / MEASURES_NAME) as temporary:
-        described = {measure.name: measure.as_json() for measure in listed}
         temporary.write_text(json.dumps(described, indent=2) + "\n")
     say(f"trained with features '{model.training.get('features', 'unknown')}'")
-    _print(listed)
-    say(f"report: {out / REPORT_NAME}")
+    if options.json:
+        print_json(described)
+    else:
+        _print(listed)
+    made("report", out / REPORT_NAME)
 
 
 def _judges(model: Model, metric: StyleMetric, size: int) -> list[Judge]:

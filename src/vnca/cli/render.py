@@ -12,8 +12,8 @@ import numpy as np
 import tyro
 
 from vnca.cli.film import Bounds, Film, FilmConfig, Shown, parse_colour, picture
-from vnca.cli.options import parse, say
-from vnca.cli.progress import tracked
+from vnca.cli.options import parse
+from vnca.cli.progress import made, tracked
 from vnca.cli.sequence import open_sequence, sequence_bounds, volumes
 from vnca.core.errors import OptionError
 from vnca.core.files import existing_file, writable_file
@@ -102,7 +102,7 @@ def render_sequence(options: Render) -> None:
     writable_file(options.out)
     if options.strip:
         write_image(options.out, contact_sheet([strip(sequence, options, options.strip)]))
-        say(f"rendered: {options.out}")
+        made("rendered", options.out)
         return
     if not options.is_film and len(sequence) > 1 and "#" not in options.out.name:
         raise OptionError(
@@ -116,7 +116,7 @@ def render_sequence(options: Render) -> None:
         _film(shown, len(sequence), bounds, options)
     else:
         _pictures(shown, bounds, options)
-    say(f"rendered: {options.out}")
+    made("rendered", options.out)
 
 
 def strip(sequence: FrameSequence, options: Render, count: int) -> list[FloatArray]:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import torch
 
 from vnca.cli.options import say
-from vnca.cli.progress import Progress
+from vnca.cli.progress import Progress, made
 from vnca.cli.recorded import PICTURE_CELLS, recorded, restored
 from vnca.core.errors import (
     DivergenceError,
@@ -171,7 +171,7 @@ class Session:
             ) from None
         self._show()
         folder.finish()
-        say(f"model: {folder.path}")
+        made("model", folder.path)
 
     @property
     def _call(self) -> str:

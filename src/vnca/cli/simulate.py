@@ -7,8 +7,8 @@ from typing import Literal
 
 import tyro
 
-from vnca.cli.options import parse, say
-from vnca.cli.progress import tracked
+from vnca.cli.options import parse
+from vnca.cli.progress import made, tracked
 from vnca.core.errors import OptionError
 from vnca.core.files import writable_folder
 from vnca.io.smoke import write_smoke
@@ -52,4 +52,4 @@ def write_simulation(options: Simulate) -> None:
     )
     for volume in tracked(volumes, "simulating", options.frames, "frames"):
         write_smoke(options.out / f"{options.scene}_{volume.frame:04d}.vdb", volume)
-    say(f"smoke: {options.out}")
+    made("smoke", options.out)

@@ -15,7 +15,7 @@ import tyro
 import vnca
 from vnca.cli.film import Film, FilmConfig, Shown
 from vnca.cli.options import parse, say
-from vnca.cli.progress import Progress
+from vnca.cli.progress import Progress, made
 from vnca.cli.recorded import recorded_smoke
 from vnca.cli.sequence import (
     open_sequence,
@@ -178,9 +178,9 @@ def paint(options: Stylize, model: Model | None = None) -> None:
         facts=facts,
     )
     is_filmed = _paint(painter, options)
-    say(f"painted: {options.out}")
-    if is_filmed:
-        say(f"film: {options.preview}")
+    made("painted", options.out)
+    if is_filmed and options.preview:
+        made("film", options.preview)
 
 
 def _digest(rule: Rule) -> str:

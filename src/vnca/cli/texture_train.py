@@ -48,7 +48,7 @@ class TrainTexture(TrainingOptions):
     up_axis: UpAxis | None = None
     """The mesh's up axis; y for OBJ and GLB, z for PLY and STL unless given."""
     preset: Literal["draft", "standard"] = "draft"
-    """Values of all options below that are not given."""
+    """Values of all hyperparameters that are not given."""
     config: Annotated[TextureConfig, tyro.conf.arg(name="")] = field(default_factory=TextureConfig)
     """Hyperparameters."""
 
