@@ -156,7 +156,7 @@ def test_painting_a_given_sequence_is_timed(
     report = tmp_path / "stylize.json"
     outcome = vnca(
         *("bench", "stylize", "--model", model, "--sequence", smoke, *STYLIZE),
-        *("--frames", "1-2", "--backends", "reference", "--json", report),
+        *("--frames", "1-2", "--backends", "numpy", "--json", report),
     )
     assert outcome.code == 0, outcome.err
     rows = json.loads(report.read_text())["rows"]

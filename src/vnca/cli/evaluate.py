@@ -75,6 +75,7 @@ class Evaluate:
     """How the rule is applied."""
 
     def __post_init__(self) -> None:
+        Compute(self.backend)
         if self.size < 64:
             raise OptionError(f"--size {self.size}: at least 64 pixels are needed")
         if self.style_scale is not None:

@@ -82,6 +82,7 @@ class Stylize:
     """How the preview is filmed."""
 
     def __post_init__(self) -> None:
+        Compute(self.backend, precision=self.precision)
         for name in ("gamma", "density_scale"):
             value = getattr(self, name)
             if value is not None and not 0 < value < inf:
