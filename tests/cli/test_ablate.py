@@ -41,9 +41,8 @@ def test_the_velocity_ablation_trains_and_compares_three_kinds(
     assert trained["both-1"].rule.config.velocity_prior
 
     before = (tmp_path / "runs" / "both-0" / "model.safetensors").stat().st_mtime_ns
-    again = vnca(*arguments)
-    assert again.out == outcome.out
-    assert json.loads(vnca(*arguments, "--json", "-").out) == measures
+    again = vnca(*arguments, "--json", "-")
+    assert json.loads(again.out) == measures
     assert (tmp_path / "runs" / "both-0" / "model.safetensors").stat().st_mtime_ns == before
 
 

@@ -15,7 +15,6 @@ import tyro
 from vnca.cli.help import ASKED, SHORT, help_text
 from vnca.cli.progress import as_options, end_line
 from vnca.core.errors import OptionError
-from vnca.engine.backend import backend_named
 
 T = TypeVar("T")
 STDOUT = Path("-")
@@ -55,9 +54,6 @@ def parse(
         )
         print(shown)
         raise SystemExit(0)
-    backend = chosen(arguments, "--backend", "auto")
-    if backend != "auto":
-        backend_named(backend)  # Reported before any file is read.
     complaint = io.StringIO()
     try:
         with redirect_stderr(complaint):
