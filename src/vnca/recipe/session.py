@@ -41,7 +41,7 @@ THUMBNAIL = 96
 class TrainingOptions:
     """What is asked of a training, whatever it is trained on."""
 
-    out: Path | None = None
+    out: Path | None
     """Folder of the run: model, configuration, previews and loss curves."""
     overwrite: bool = False
     """Replace the model of an earlier run in the same folder."""

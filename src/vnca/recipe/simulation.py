@@ -21,7 +21,7 @@ class SimulateRun:
 
     scene: Scene
     """A rising plume, two colliding jets, or a rising vortex ring."""
-    out: Path | None = None
+    out: Path | None
     """Folder for the frames, named SCENE_0001.vdb and on."""
     resolution: int = 48
     """Cells across the scene."""
