@@ -355,7 +355,10 @@ def test_flat_voxels_that_take_too_many_cubes_are_refused(
     path = tmp_path / "s_1.vdb"
     needles = np.diag([0.0001, 0.0001, 100.0, 1.0])
     write_smoke(path, dataclasses.replace(tiny_smoke, index_to_world=needles))
-    complaint = vnca("stylize", model, path, "--out", out).complaint
+    outcome = vnca("stylize", model, path, "--out", out)
+    told, complaint = outcome.err.splitlines()
+    assert outcome.code == 2
+    assert "its smoke is resampled" in told
     assert f"{path}: grid 'density': takes " in complaint
     assert "cubic cells as small as the shortest side of the sequence's voxels" in complaint
 

@@ -127,7 +127,7 @@ def test_sub_frames_are_left_out_only_where_whole_frames_are_asked_for(
     tmp_path: Path, name: str
 ) -> None:
     make(tmp_path, *SUB_FRAMES)
-    whole = r"s\.10\.25\.vdb and 2 more are sub-frames.* whole frames with --frames 10-11$"
+    whole = r"s\.10\.25\.vdb and 2 more are sub-frames.* whole frames with `frames` 10-11$"
     with pytest.raises(SequenceError, match=whole):
         find_frames(tmp_path / name)
     sequence = find_frames(tmp_path / name, "10-11")

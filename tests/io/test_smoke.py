@@ -252,7 +252,7 @@ def spoiled(values: AnyArray, bad: float) -> AnyArray:
         (
             [grid("soot", density()), grid("Cd", vectors())],
             {},
-            r"no density grid 'density'; choose with --density-grid from soot \(float\), Cd \(vec",
+            r"no density grid 'density'; choose with `density_grid` from soot \(float\), Cd \(vec",
         ),
         ([grid("density", vectors())], {}, "holds vectors, expected numbers"),
         (
@@ -273,17 +273,17 @@ def spoiled(values: AnyArray, bad: float) -> AnyArray:
         (
             [grid("density", density()), grid("vel.x", density()), grid("vel.z", density())],
             {},
-            r"velocity 'vel' lacks the scalar grid vel\.y; leave .* --velocity-grid none",
+            r"velocity 'vel' lacks the scalar grid vel\.y; leave .* `velocity_grid` none",
         ),
         (
             [grid("density", density())],
             {"velocity_grid": "wind"},
-            r"no velocity 'wind'; choose with --velocity-grid .* density \(float\)",
+            r"no velocity 'wind'; choose with `velocity_grid` .* density \(float\)",
         ),
         (
             [grid("density", density()), grid("v", vectors(), origin=(40, 0, 0))],
             {},
-            r"grid 'v' covers cells \(40, 0, 0\) to \(45, 6, 7\), .* do not meet; .*-grid none",
+            r"grid 'v' covers cells \(40, 0, 0\) to \(45, 6, 7\), .* do not meet; .*`velocity_grid` none",
         ),
         (
             [grid("density", density()), grid("v", vectors())],

@@ -254,10 +254,13 @@ def countless(_: AnyArray) -> list[Grid]:
 @pytest.mark.parametrize(
     ("grids", "words"),
     [
-        (far, "velocity grid 'vel' has no value near the smoke.*--velocity-grid none"),
-        (different, r"grids 'vel\.x' and 'vel\.z' differ in their voxels.*--velocity-grid none"),
+        (far, "velocity grid 'vel' has no value near the smoke.*`velocity_grid` none"),
+        (different, r"grids 'vel\.x' and 'vel\.z' differ in their voxels.*`velocity_grid` none"),
         (spoiled, "grid 'vel': 1 of .* values are NaN"),
-        (countless, r"grid 'vel\.x' has more cells where the smoke is than \d+.*-grid none"),
+        (
+            countless,
+            r"grid 'vel\.x' has more cells where the smoke is than \d+.*`velocity_grid` none",
+        ),
     ],
 )
 def test_what_cannot_be_resampled_is_one_line_that_names_the_way_out(

@@ -334,5 +334,5 @@ def test_what_is_compared_in_grey_may_be_a_picture_of_its_own(
 def test_a_density_in_grey_that_nothing_looks_at_is_refused() -> None:
     assert AppearanceConfig(grey_source="density").shows_density
     assert not AppearanceConfig().shows_density
-    with pytest.raises(OptionError, match=r"`appearance`\.grey-source"):
+    with pytest.raises(OptionError, match=r"`appearance\.grey_source`"):
         AppearanceConfig(grey=False, grey_source="density")

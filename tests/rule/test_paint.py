@@ -15,7 +15,7 @@ from vnca.rule.decoder import Decoder
 from vnca.rule.paint import Between, colours, density_factors
 from vnca.rule.rule import Rule, RuleConfig, Scales
 
-BACKENDS = ["reference"] if native.unavailable() else ["reference", "native"]
+BACKENDS = ["numpy"] if native.unavailable() else ["numpy", "native"]
 
 
 def rule(*, decoder: bool = True) -> Rule:

@@ -11,7 +11,7 @@ from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
-from vnca.losses.pixels import luminance
+from vnca.losses.pixels import luma
 from vnca.rule.rule import DENSITY_CHANGE, Rule, RuleConfig
 from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
 from vnca.training.smoke_config import SmokeConfig, ViewConfig
@@ -43,7 +43,7 @@ def test_smoke_as_it_is_looks_about_white(scene: SmokeScene) -> None:
     assert 0.8 < float(seen[0, 0][inside].mean()) < 1.2
     # What is behind is as bright as behind the coloured view.
     coloured = scene.pictures(state, front(scene), GREY)[0]
-    torch.testing.assert_close(seen[0, 0, 0, 0], luminance(coloured)[0, 0, 0, 0])
+    torch.testing.assert_close(seen[0, 0, 0, 0], luma(coloured)[0, 0, 0, 0])
 
 
 def test_it_shows_the_change_of_the_density_and_no_colour(scene: SmokeScene) -> None:

@@ -234,8 +234,9 @@ def _paint_vdb(
     told: Mapping[str, Entry],
 ) -> None:
     with open_vdb(source) as file:
+        about = {**without_provenance(file.metadata), **told}
         if not file.grids:
-            write_vdb(path, [], metadata=file.metadata)
+            write_vdb(path, [], metadata=about)
             return
         header, old, cells = read_density(file, format)
         what = f"{source}: grid {header.name!r}"
@@ -270,7 +271,7 @@ def _paint_vdb(
             )
             for name in colour_grids
         ]
-        write_vdb(path, grids, metadata={**without_provenance(file.metadata), **told})
+        write_vdb(path, grids, metadata=about)
 
 
 def _paint_npz(

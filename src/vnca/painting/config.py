@@ -30,5 +30,4 @@ class StylizeConfig:
             raise OptionError("`steps_per_frame` and `warmup` must not be negative")
         for name in ("strength", "density_strength"):
             if not 0 <= getattr(self, name) <= 1:
-                option = name.replace("_", "-")
-                raise OptionError(f"`{option}` {getattr(self, name)}: must be from 0 to 1")
+                raise OptionError(f"`{name}` {getattr(self, name)}: must be from 0 to 1")

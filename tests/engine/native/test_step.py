@@ -76,7 +76,7 @@ def test_an_output_upon_an_input_is_refused(arguments: dict[str, Any], name: str
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited as Linux does it")
 def test_memory_running_out_in_a_thread_is_an_error_and_not_the_end() -> None:
-    script = Path(__file__).with_name("out_of_memory.py")
+    script = Path(__file__).parents[1] / "out_of_memory.py"
     done = subprocess.run([sys.executable, script], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert {"there", "not there"} <= set(done.stdout.split("\n"))

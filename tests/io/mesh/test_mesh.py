@@ -13,7 +13,7 @@ from vnca.io.mesh.glb import Glb
 from vnca.io.mesh.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import base_colours
 
-DATA = Path(__file__).parents[1] / "data"
+DATA = Path(__file__).parents[2] / "data"
 BOX = trimesh.creation.box((1, 2, 3))
 
 

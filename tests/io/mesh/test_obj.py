@@ -28,7 +28,7 @@ def test_a_file_of_triangles_stays_as_it_is() -> None:
 
 
 def test_a_concave_polygon_of_the_field_has_its_own_area(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[1] / "data/ngon.obj").read_bytes()
+    text = (Path(__file__).parents[2] / "data/ngon.obj").read_bytes()
     assert areas(tmp_path, text) == pytest.approx([2.5])
 
 
