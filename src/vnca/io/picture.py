@@ -59,7 +59,7 @@ _GLARING = 2.0
 _SMALLEST_STYLE = 8
 
 
-def read_image(path: Path) -> FloatArray:
+def read_image(path: str | Path) -> FloatArray:
     """Read a picture upright, as linear RGB; its content decides the format, not its name.
 
     PNG, JPEG, WebP, AVIF, TIFF, GIF, BMP, PPM, JPEG 2000, TGA, OpenEXR and Radiance HDR. Colour
@@ -76,17 +76,17 @@ def read_image(path: Path) -> FloatArray:
             than Pillow's limit against decompression bombs (89 million pixels).
         BackendUnavailableError: If the package that the format needs is not installed.
     """
-    return _over_white(*_read(path))
+    return _over_white(*_read(Path(path)))
 
 
-def read_style(path: Path) -> FloatArray:
+def read_style(path: str | Path) -> FloatArray:
     """Read a picture to learn from: like `read_image`, and there is something in it to learn.
 
     Raises:
         FileFormatError: If it is transparent, a single colour or tiny; and as `read_image` says.
         BackendUnavailableError: If the package that the format needs is not installed.
     """
-    colour, alpha = _read(path)
+    colour, alpha = _read(Path(path))
     if alpha is not None and not alpha.any():
         raise FileFormatError(f"{path}: the picture is fully transparent; nothing can be learned")
     return _with_something_to_learn(_over_white(colour, alpha), str(path))
@@ -128,7 +128,7 @@ def kind_of(data: bytes) -> str:
                 "something else")  # fmt: skip
 
 
-def write_image(path: Path, image: AnyArray) -> None:
+def write_image(path: str | Path, image: AnyArray) -> None:
     """Write a picture as PNG, JPEG, WebP (8-bit sRGB) or OpenEXR (linear, half floats).
 
     PNG and WebP store straight alpha, OpenEXR premultiplied; JPEG, which has none, shows the
