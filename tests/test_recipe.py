@@ -87,7 +87,7 @@ def test_the_whole_job_in_five_lines(
     model = vnca.train(frame, str(picture), texture=0.5, velocity_units="cells/frame", **TINY)
     paths = [f.path for f in vnca.stylize(model, str(cache), out=painted, refine=2, warmup=2)]
     vnca.render(painted, out=film, film={"rows": 32, "columns": 32})
-    found = vnca.evaluate(model, str(cache), size=96, warmup=2)
+    found = vnca.evaluate(model, str(cache), frames="2", size=96, warmup=2)
     out, err = capfd.readouterr()
     assert (out, err) == ("", "")  # a library prints nothing
     assert paths == [Path(painted) / f"ball_000{number}.vdb" for number in (1, 2)]
@@ -154,7 +154,7 @@ def test_a_training_is_cancelled_and_resumed(cache: Path, picture: Path, tmp_pat
 def test_a_painting_is_cancelled_and_resumed(cache: Path, model: Path, tmp_path: Path) -> None:
     whole = [f.path for f in vnca.stylize(model, cache, out=tmp_path / "whole", warmup=2)]
     with pytest.raises(vnca.Cancelled):
-        [*vnca.stylize(model, cache, out=tmp_path / "out", warmup=2, watch=Listener(until=1))]
+        list(vnca.stylize(model, cache, out=tmp_path / "out", warmup=2, watch=Listener(until=1)))
     assert len([*(tmp_path / "out").glob("*.vdb")]) == 1
     resumed = vnca.stylize(model, cache, out=tmp_path / "out", warmup=2, resume=True)
     for one, other in zip(whole, [f.path for f in resumed], strict=True):
@@ -169,7 +169,7 @@ def test_who_stops_asking_can_resume_too(cache: Path, model: Path, tmp_path: Pat
     assert first.number == 1
     painting.close()  # type: ignore[attr-defined]
     listener = Listener()
-    [*vnca.stylize(model, cache, out=tmp_path / "out", warmup=2, resume=True, watch=listener)]
+    list(vnca.stylize(model, cache, out=tmp_path / "out", warmup=2, resume=True, watch=listener))
     assert listener.told == [("painting", 1, 2), ("painting", 2, 2)]
 
 

@@ -90,7 +90,7 @@ def on_plume(study: Generalisation) -> Generalisation:
 
 def painted(study: Generalisation, rule: Rule) -> Iterator[Painting]:
     """The sequence as the rule paints it."""
-    sequence = open_sequence(study.sequence, study.frames, Lines())
+    sequence = open_sequence(str(study.sequence), study.frames, Lines())
     lattice, box = sequence_region(sequence, study.smoke, Lines())
     frames = volumes(sequence, study.smoke, lattice)
     return stylize(frames, rule, PAINTED, box=box)

@@ -155,7 +155,6 @@ def evaluate(
         sequence = model.inputs["frame"]
     if isinstance(sequence, Volume):
         sequence = [sequence]
-    is_array = style is not None and not isinstance(style, (str, Path))
     asked = EvaluateRun(
         run=name,
         sequence=str(sequence) if isinstance(sequence, (str, Path)) else None,
@@ -169,7 +168,7 @@ def evaluate(
         smoke=smoke,
         config=config,
     )
-    if is_array:
+    if style is not None and not isinstance(style, (str, Path)):
         model = dataclasses.replace(model, inputs={**model.inputs, "style": style_array(style)})
     if sequence is None or isinstance(sequence, (str, Path)):
         return run(asked, model, watch)
@@ -207,11 +206,9 @@ def run(
     """
     out = None if options.out is None else writable_folder(options.out)
     picture = _picture(options, model)
-    if given is None:
-        sequence = open_sequence(_sequence(options, model), options.frames, watch)
     width = _compared_width(options, model)
     if given is None:
-        given = _files(sequence, options, watch)
+        given = _files(options, model, watch)
     rule = placed(model.rule, given.region, watch)
     refine = options.refine
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.
@@ -242,7 +239,8 @@ def run(
     return evaluation
 
 
-def _files(sequence: Any, options: EvaluateRun, watch: Watch) -> _Smoke:
+def _files(options: EvaluateRun, model: Model, watch: Watch) -> _Smoke:
+    sequence = open_sequence(_sequence(options, model), options.frames, watch)
     smoke = with_fitted_scale(options.smoke, sequence)
     still = dataclasses.replace(smoke, velocity_grid=NO_VELOCITY)
     region = sequence_region(sequence, smoke, watch)

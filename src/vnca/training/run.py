@@ -162,7 +162,7 @@ class NoFolder:
     def _ignore(self, *_: object) -> None:
         pass
 
-    reserve = start = log = save = keep = _ignore
+    reserve = start = log = preview = save = keep = _ignore
 
     def finish(self) -> None:
         """Nothing to remove."""
