@@ -23,6 +23,10 @@ class Progress:
         """Print what the user should know."""
         print(line)
 
+    def made(self, what: str, path: Path) -> None:
+        """Print where a result is."""
+        print(f"{what}: {path}")
+
 
 def main(out: str = "example", iterations: str = "250") -> None:
     """Do it all, in a folder."""

@@ -18,10 +18,16 @@ RANKS = {
     "training": 6,
     "metrics": 7, "bench": 7, "viewer": 7,
     "recipe": 8,
-    "cli": 9,
+    "cli": 9, "__main__": 10,
 }  # fmt: skip
 WITHOUT_TORCH = {"core", "rule", "io", "simulation", "painting"}
-BACKENDS_WITH_TORCH = ("reference/", "triton/", "native/step_autograd", "native/decode_autograd")
+BACKENDS_WITH_TORCH = (
+    "tensors.py",
+    "reference/",
+    "triton/",
+    "native/step_autograd",
+    "native/decode_autograd",
+)
 SOURCES = sorted(p for p in ROOT.rglob("*.py") if p != ROOT / "__init__.py")
 
 

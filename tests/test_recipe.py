@@ -78,6 +78,9 @@ class Listener:
     def note(self, line: str) -> None:
         self.lines.append(line)
 
+    def made(self, what: str, path: Path) -> None:
+        self.lines.append(f"{what}: {path}")
+
 
 # Takes as long as all others together: it trains, paints, films and measures.
 def test_the_whole_job_in_five_lines(

@@ -49,11 +49,11 @@ def test_the_native_kernel_paints_in_bfloat16_and_the_reference_does_not(
     painted: PaintedSequence,
 ) -> None:
     rows = measure_stylizing(
-        painted, ("native", "reference"), threads=1, repeats=1, precision="bfloat16"
+        painted, ("native", "numpy"), threads=1, repeats=1, precision="bfloat16"
     )
     assert {row["backend"]: row["dtype"] for row in rows} == {
         "native": "bfloat16",
-        "reference": "float32",
+        "numpy": "float32",
     }
 
 
@@ -71,11 +71,11 @@ def test_nothing_is_timed_when_a_backend_paints_something_else(
     monkeypatch.setattr(native_backend, "_update", careless)
     monkeypatch.setattr(stylize, "in_turns", never)
     with pytest.raises(DisagreementError, match="native: state after a frame"):
-        measure_stylizing(painted, ("reference", "native"), threads=1, repeats=1)
+        measure_stylizing(painted, ("numpy", "native"), threads=1, repeats=1)
 
 
 def test_a_random_rule_changes_what_it_sees(painted: PaintedSequence) -> None:
-    roll = painted.roll("reference", 1, "float32")
+    roll = painted.roll("numpy", 1, "float32")
     values = roll.paint(painted.volumes[0], roll.start()).state.values
     assert np.isfinite(values).all()
     assert np.abs(values[:-1]).max() > 1e-3

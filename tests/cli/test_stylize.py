@@ -130,8 +130,8 @@ def test_a_precision_that_cannot_be_had_is_told_before_work(
     vnca: Vnca, model: Path, smoke: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     command = ["stylize", model, smoke, "--out", tmp_path / "out", "--precision", "bfloat16"]
-    complaint = vnca(*command, "--backend", "reference").complaint
-    assert "backend reference cannot run with bfloat16: only the native kernel has it" in complaint
+    complaint = vnca(*command, "--backend", "numpy").complaint
+    assert "backend numpy cannot run: only the native backend has bfloat16" in complaint
     reasons = {"float32": None, "bfloat16": "this processor lacks it"}
     monkeypatch.setattr(native, "unavailable", lambda precision="float32": reasons[precision])
     assert "native cannot run with bfloat16: this processor" in vnca(*command).complaint
@@ -407,7 +407,7 @@ def test_without_torch_and_a_compiler_the_slow_step_runs_and_says_so_once(
     absent = "vnca.engine.native._native"
     done = without_training("stylize", model, smoke, "--out", out, *QUICK, absent=absent)
     assert done.returncode == 0, done.stderr
-    assert done.stderr.count("running the slow reference step: its extension was not built") == 1
+    assert done.stderr.count("running the slow numpy step: its extension was not built") == 1
     fast = painted()
     a, b = (dense(grids(folder / "ball_0003.vdb")["Cd"])[0] for folder in (out, fast))
     np.testing.assert_allclose(a, b, atol=1e-4)

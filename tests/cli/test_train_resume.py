@@ -114,7 +114,7 @@ def test_changed_inputs_are_refused(vnca: Vnca, begin: Begin, smoke: Path, style
     before = contents(run)
     complaint = vnca("train", "--resume", run, "--frame", smoke / "ball_0003.vdb").complaint
     assert "the frame changed since this training began" in complaint
-    Image.new("RGB", (40, 50), "red").save(style)
+    Image.linear_gradient("L").resize((40, 50)).convert("RGB").save(style)
     complaint = vnca("train", "--resume", run).complaint
     assert "the style picture changed" in complaint
     assert contents(run) == before

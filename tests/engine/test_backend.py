@@ -10,11 +10,11 @@ from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.engine import backend, reference
 from vnca.engine import triton as triton_backend
 from vnca.engine.automaton import Automaton, Weights
-from vnca.engine.backend import BACKENDS, backend_named, choose, open_session
+from vnca.engine.backend import backend_named, choose, open_session
 from vnca.engine.domain import Domain
 from vnca.engine.mask import changing_rows
 from vnca.engine.native import step as native
-from vnca.engine.session import Compute
+from vnca.engine.session import BACKENDS, Compute
 from vnca.engine.stencil import stencil
 from vnca.engine.triton import step as triton
 

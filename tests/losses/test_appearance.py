@@ -328,7 +328,7 @@ def test_what_is_compared_in_grey_may_be_a_picture_of_its_own(
     assert other.grad is not None
     assert other.grad.abs().sum() > 0
     with pytest.raises(ShapeError, match="grey"):
-        loss(picture, opaque, generator(), luma[..., 1:])
+        loss(picture, opaque, generator(), grey[..., 1:])
 
 
 def test_a_density_in_grey_that_nothing_looks_at_is_refused() -> None:

@@ -29,7 +29,7 @@ from vnca.painting.roll import Roll
 from vnca.rule.rule import Rule, RuleConfig, Scales
 from vnca.simulation.scenes import simulate
 
-BACKENDS = ("native", "numpy", "reference")
+BACKENDS = ("native", "numpy")
 TOLERANCES: dict[str, float] = {"float32": 1e-3, "bfloat16": 5e-2}
 """Of the state after the first frame: norm of the difference from the first backend over the norm.
 A trained rule multiplies what rounding does in tens of steps."""

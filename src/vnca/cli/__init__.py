@@ -6,7 +6,9 @@ import sys
 from collections.abc import Sequence
 
 import vnca
-from vnca.cli.progress import as_options, end_line
+from vnca.cli.help import JSON_PROGRESS
+from vnca.cli.options import spelled_out
+from vnca.cli.progress import as_options, end_line, event, json_events
 from vnca.cli.subcommands import usage
 from vnca.cli.termination import terminable
 from vnca.core.errors import Terminated, VncaError
@@ -18,6 +20,7 @@ COMMANDS = {
     "stylize": "paint a smoke sequence with a trained rule",
     "texture": "grow solid textures and put them on meshes",
     "evaluate": "measure how well a rule paints a sequence, in a report",
+    "ablate": "train without parts of the method, and measure what these do",
     "render": "make a film or a turntable of a sequence",
     "bench": "time steps, training and painting on this machine",
     "info": "describe a volume file, a model or a training run",
@@ -34,9 +37,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     # On a machine that is busy, threads that spin while they wait cost several times the work.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+    words = spelled_out(sys.argv[1:] if arguments is None else arguments)
     try:
         try:
-            return _call(list(sys.argv[1:] if arguments is None else arguments))
+            with json_events(wanted=JSON_PROGRESS in words):
+                return _call([word for word in words if word != JSON_PROGRESS])
         finally:
             sys.stdout.flush()
     except BrokenPipeError:
@@ -67,13 +72,20 @@ def _call(arguments: Sequence[str]) -> int:
     except MemoryError as error:
         return _failed(f"'vnca {name}' ran out of memory ({error}); give it less to hold at once")
     except KeyboardInterrupt as stop:
-        print(file=sys.stderr)
-        return 143 if isinstance(stop, Terminated) else 130
+        code = 143 if isinstance(stop, Terminated) else 130
+        if not event("error", message="stopped", exit_code=code):
+            print(file=sys.stderr)
+        return code
+    except Exception as fault:
+        event("error", message=f"a fault of vnca: {fault!r}", exit_code=1)
+        raise
     return 0
 
 
 def _failed(message: str) -> int:
     end_line()
     # What a library says of a damaged file may have several lines.
-    print("vnca:", as_options(" ".join(message.split())), file=sys.stderr)
+    line = as_options(" ".join(message.split()))
+    if not event("error", message=line, exit_code=2):
+        print("vnca:", line, file=sys.stderr)
     return 2

@@ -1,5 +1,6 @@
 """What the options of all benchmarks have in common: `64x64x96`, `plain,native`, and tables."""
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any, TypeVar, get_args
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
 from vnca.bench.records import append_csv, write_json
-from vnca.cli.options import parse
+from vnca.cli.options import STDOUT, parse, print_json
 from vnca.core.errors import OptionError
 from vnca.core.files import writable_file
 from vnca.core.typing import Index
@@ -21,7 +22,7 @@ _RULES = ConstructorRegistry()
 def parse_bench(command: str, options: Callable[..., T], arguments: Sequence[str]) -> T:
     """As `parse`, with grids written as XxYxZ and names divided by commas."""
     with _RULES:
-        return parse(f"bench {command}", options, arguments)
+        return parse(f"bench {command}", options, arguments, separator=",")
 
 
 @_RULES.primitive_rule
@@ -63,7 +64,7 @@ class Tables:
     """Where what is measured is kept."""
 
     json: Path | None = None
-    """Write the rows of this run here."""
+    """Write the rows of this run here; - prints them, and the table on standard error."""
     csv: Path | None = None
     """Add the rows to this table."""
 
@@ -73,8 +74,13 @@ class Tables:
         Raises:
             OutputError: If there is one.
         """
-        for path in filter(None, (self.json, self.csv)):
-            writable_file(path)
+        for path in (None if self.json == STDOUT else self.json, self.csv):
+            if path is not None:
+                writable_file(path)
+
+    def print(self, text: str) -> None:
+        """Show a part of a table: on standard error where JSON is printed."""
+        print(text, file=sys.stderr if self.json == STDOUT else sys.stdout)
 
     def keep(
         self, facts: Mapping[str, Any], rows: Rows, peaks: Mapping[str, Any] | None = None
@@ -89,7 +95,9 @@ class Tables:
         Raises:
             VncaError: If a file cannot be written.
         """
-        if self.json is not None:
+        if self.json == STDOUT:
+            print_json({**facts, **(peaks or {}), "rows": rows})
+        elif self.json is not None:
             write_json(self.json, {**facts, **(peaks or {})}, rows)
         if self.csv is not None:
             append_csv(self.csv, facts, rows)

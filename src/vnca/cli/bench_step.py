@@ -35,10 +35,10 @@ def bench_step(options: Step) -> None:
     """
     options.require_writable()
     facts = prepare(options.config)
-    print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
+    options.print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
     rows = []
     for run in measure_steps(options.config):
-        print("\n".join(_table(run)))
+        options.print("\n".join(_table(run)))
         rows += run.rows
     peaks = {name: rows[0][name] for name in ("gemm_gflops", "copy_gbs")}
     options.keep(facts, rows, peaks)

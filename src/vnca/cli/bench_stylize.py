@@ -52,7 +52,7 @@ class BenchStylize(Tables):
     steps_per_frame: int | None = None
     """Steps of the automaton in each frame; the rule's own unless given."""
     backends: tuple[str, ...] = ()
-    """Of native, numpy and reference; all that can run here unless given."""
+    """Of native and numpy; all that can run here unless given."""
     precision: str = "float32"
     """What the native kernel rounds the factors of its products to."""
     threads: int = default_threads()
@@ -100,8 +100,8 @@ def bench_stylize(options: BenchStylize) -> None:
             repeats=options.repeats,
             precision=options.precision,
         )
-    print("{device}, {threads} threads, vnca {vnca}".format(**facts))
-    print("\n".join(_table(rows)))
+    options.print("{device}, {threads} threads, vnca {vnca}".format(**facts))
+    options.print("\n".join(_table(rows)))
     options.keep(facts, rows)
 
 
@@ -125,9 +125,9 @@ def _table(rows: Rows) -> list[str]:
         f"{first['steps']} steps a frame, hidden {first['hidden']}",
         "all agree on the first frame",
         f"{'backend':10}{'dtype':10}{'':12}{'seconds a frame (min to max)':>32}{'frames/s':>10}"
-        f"{'ns a cell and step':>20}{'MB':>8}{'against reference':>19}",
+        f"{'ns a cell and step':>20}{'MB':>8}{'against numpy':>19}",
     ]
-    slow = {row["files"]: row["seconds"] for row in rows if row["backend"] == "reference"}
+    slow = {row["files"]: row["seconds"] for row in rows if row["backend"] == "numpy"}
     for row in rows:
         spread = f"({short(row['seconds_min'])} to {short(row['seconds_max'])})"
         gain = f"{slow[row['files']] / row['seconds']:.1f}×" if slow else ""

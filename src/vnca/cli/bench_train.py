@@ -115,8 +115,8 @@ def bench_train(options: BenchTrain) -> None:
         repeats=options.repeats,
     )
     rows = [{**row, "preset": options.preset} for row in rows]
-    print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
-    print("\n".join(_table(rows)))
+    options.print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
+    options.print("\n".join(_table(rows)))
     options.keep(facts, rows)
 
 

@@ -1,4 +1,4 @@
-"""`vnca evaluate RUN [SEQUENCE]`, and `vnca evaluate FRAME STYLE --ablation velocity --out DIR`."""
+"""`vnca evaluate RUN [SEQUENCE]`."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from vnca.cli.options import is_given, parse
+from vnca.cli.options import parse, print_json
 from vnca.cli.watch import Terminal
 from vnca.io.smoke import SmokeFormat
 from vnca.painting.config import StylizeConfig
@@ -18,11 +18,7 @@ from vnca.recipe.recorded import load, recorded_smoke
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate(evaluation.EvaluateRun):
-    """Measure how well a trained rule paints a sequence, and write a report with pictures.
-
-    `vnca evaluate FRAME STYLE --ablation velocity --out DIR` trains with and without a part of
-    the method instead, and compares how their textures move.
-    """
+    """Measure how well a trained rule paints a sequence, and write a report with pictures."""
 
     run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RUN")]
     """A model file, or the folder of a training run."""
@@ -30,6 +26,8 @@ class Evaluate(evaluation.EvaluateRun):
     """A folder, a pattern or a file; the frame of the training unless given."""
     out: Path | None = None
     """Folder for report.html and report.json; "evaluation" in that of the run unless given."""
+    json: bool = False
+    """Print the measures as JSON, as in report.json, instead of a table."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: Annotated[StylizeConfig, tyro.conf.arg(name="")] = field(default_factory=StylizeConfig)
@@ -38,11 +36,6 @@ class Evaluate(evaluation.EvaluateRun):
 
 def run(arguments: Sequence[str]) -> None:
     """Read the options and measure; smoke is read as it was for training unless told otherwise."""
-    if is_given(arguments, "--ablation"):
-        from vnca.cli import evaluate_ablation
-
-        evaluate_ablation.run(arguments)
-        return
     options = parse("evaluate", Evaluate, arguments)
     model = load(options.run)
     smoke = recorded_smoke(options.run, model)
@@ -50,4 +43,8 @@ def run(arguments: Sequence[str]) -> None:
         missing: Any = tyro.MISSING
         options = parse("evaluate", Evaluate, arguments, default=Evaluate(run=missing, smoke=smoke))
     out = options.out or evaluation.run_folder_of(options.run) / "evaluation"
-    print(evaluation.run(dataclasses.replace(options, out=out), model, Terminal()))
+    found = evaluation.run(dataclasses.replace(options, out=out), model, Terminal())
+    if options.json:
+        print_json(found.as_json())
+    else:
+        print(found)

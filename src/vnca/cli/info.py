@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
-from vnca.cli.options import parse
+from vnca.cli.options import parse, print_json
 from vnca.core.errors import FileFormatError, printable
 from vnca.core.files import existing_file
 from vnca.io.vdb import GridHeader, open_vdb
@@ -21,11 +21,17 @@ class Info:
 
     path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
     """A .vdb file, a .safetensors model, or the folder of a run."""
+    json: bool = False
+    """Print an object in JSON instead of lines."""
 
 
 def run(arguments: Sequence[str]) -> None:
     """Read the options and describe."""
-    for line in describe(parse("info", Info, arguments).path):
+    options = parse("info", Info, arguments)
+    if options.json:
+        print_json(facts(options.path))
+        return
+    for line in describe(options.path):
         print(printable(line))
 
 
@@ -35,16 +41,70 @@ def describe(path: Path) -> list[str]:
     Raises:
         VncaError: If it is missing, damaged, or nothing vnca knows.
     """
+    return describe_model(path) if _is_model(path) else describe_vdb(path)
+
+
+def facts(path: Path) -> dict[str, Any]:
+    """What a program may want to know of a file or a run folder, as JSON values.
+
+    Raises:
+        VncaError: If it is missing, damaged, or nothing vnca knows.
+    """
+    return {"path": str(path), **(_model_facts(path) if _is_model(path) else _vdb_facts(path))}
+
+
+def _is_model(path: Path) -> bool:
+    """Whether it is a model rather than a VDB file.
+
+    Raises:
+        FileFormatError: If it is neither.
+    """
     if path.is_dir():
         if not (path / MODEL_NAME).exists():
             raise FileFormatError(f"{path}: this folder holds no {MODEL_NAME}")
-        return describe_model(path)
+        return True
     existing_file(path)
-    if path.suffix.lower() == ".vdb":
-        return describe_vdb(path)
-    if path.suffix.lower() == ".safetensors":
-        return describe_model(path)
-    raise FileFormatError(f"{path}: expected a .vdb file, a .safetensors model or a run folder")
+    suffix = path.suffix.lower()
+    if suffix not in (".vdb", ".safetensors"):
+        raise FileFormatError(f"{path}: expected a .vdb file, a .safetensors model or a run folder")
+    return suffix == ".safetensors"
+
+
+def _model_facts(path: Path) -> dict[str, Any]:
+    model = Model.load(path)
+    return {
+        "kind": "model",
+        "version": model.version,
+        "weights": model.rule.weight_count,
+        "rule": asdict(model.rule.config),
+        "scales": asdict(model.rule.scales),
+        "training": model.training,
+    }
+
+
+def _vdb_facts(path: Path) -> dict[str, Any]:
+    with open_vdb(path) as file:
+        return {
+            "kind": "vdb",
+            "grids": [_grid_facts(header) for header in file.grids.values()],
+            "unfound_grids": file.unfound,
+            "metadata": {name: entry.value for name, entry in file.metadata.items()},
+        }
+
+
+def _grid_facts(header: GridHeader) -> dict[str, Any]:
+    box, transform = header.box, header.linear_transform
+    return {
+        "name": header.name,
+        "type": header.value_type,
+        "is_half": header.is_half,
+        "class": header.grid_class,
+        "box": None if box is None or box.is_empty else [box.lower, box.upper],
+        "voxel_size": None if transform is None else list(map(float, transform.voxel_size)),
+        "is_readable": header.is_readable,
+        "is_copied": header.obstacle_to_copying is None,
+        "metadata": {name: entry.value for name, entry in header.metadata.items()},
+    }
 
 
 def describe_model(path: Path) -> list[str]:

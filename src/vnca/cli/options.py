@@ -1,29 +1,100 @@
 """From dataclasses to options: the one place that knows how a command line is read."""
 
+import io
+import json
+import re
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from contextlib import redirect_stderr
+from math import isfinite
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import tyro
 
+from vnca.cli.help import SHORT, help_text
 from vnca.cli.progress import as_options, end_line
+from vnca.core.errors import OptionError
+from vnca.engine.backend import backend_named
 
 T = TypeVar("T")
+STDOUT = Path("-")
+"""Where `--json -` writes."""
 
 
-def parse(command: str, options: Callable[..., T], arguments: Sequence[str], **keywords: Any) -> T:
+def parse(
+    command: str,
+    options: Callable[..., T],
+    arguments: Sequence[str],
+    *,
+    separator: str = " ",
+    **keywords: Any,
+) -> T:
     """An instance of the dataclass `options` from command line arguments.
 
-    Help and the messages for unknown or malformed options come from tyro, which exits with
-    code 2 for the latter.
+    `--help` and `--help-all` are answered here.
+
+    Args:
+        command: As it is called, without `vnca`.
+        options: The dataclass.
+        arguments: Those of the command line, short forms `spelled_out`.
+        separator: What stands between the values of an option that takes several, for the help.
+        **keywords: For tyro, such as the instance that holds the defaults.
+
+    Raises:
+        OptionError: If an option is unknown, missing or malformed.
+        SystemExit: If help was asked for; it is printed.
     """
-    return tyro.cli(options, prog=f"vnca {command}", args=list(arguments), **keywords)
+    if {"-h", "--help", "--help-all"}.intersection(arguments):
+        shown = help_text(
+            command,
+            cast("type", options),
+            keywords.get("default"),
+            all_of_them="--help-all" in arguments,
+            separator=separator,
+        )
+        print(shown)
+        raise SystemExit(0)
+    backend = chosen(arguments, "--backend", "auto")
+    if backend != "auto":
+        backend_named(backend)  # Else told once files were read.
+    complaint = io.StringIO()
+    try:
+        with redirect_stderr(complaint):
+            return tyro.cli(options, prog=f"vnca {command}", args=list(arguments), **keywords)
+    except SystemExit:
+        what = _in_one_line(complaint.getvalue())
+        raise OptionError(f"{what} (vnca {command} --help-all lists all options)") from None
+
+
+def _in_one_line(box: str) -> str:
+    """What tyro says in a box of several lines, without the help of the options it speaks of."""
+    said: list[str] = []
+    is_wanted = True
+    for line in box.splitlines():
+        inside = line.strip("│╭╮╰╯").rstrip()
+        if not inside.strip("─ ") or line[:1] in "╭╰":
+            is_wanted = True
+        elif re.match(r" *(Got errors|Argument helptext|For full helptext)", inside):
+            is_wanted = False
+        elif is_wanted and len(inside) - len(inside.lstrip()) <= _OPTION_INDENT:
+            said.append(inside.strip())
+    return " ".join(said).replace("{None}|", "").rstrip(".")
+
+
+_OPTION_INDENT = 6
+
+
+def spelled_out(arguments: Sequence[str]) -> list[str]:
+    """Arguments with `--out` for `-o`, and so on."""
+    words = [word.partition("=") for word in arguments]
+    return [SHORT.get(name, name) + joint + value for name, joint, value in words]
 
 
 def chosen(arguments: Sequence[str], option: str, default: str) -> str:
     """The value of an option that has to be known before the others can be read."""
     value = default
-    for word, following in zip(arguments, [*arguments[1:], default], strict=True):
+    for word, following in zip(arguments, [*arguments, default][1:], strict=True):
         if word == option:
             value = following
         elif word.startswith(f"{option}="):
@@ -40,3 +111,20 @@ def say(line: str) -> None:
     """Tell the user something that is not the result: on standard error, on a line of its own."""
     end_line()
     print(as_options(line), file=sys.stderr, flush=True)
+
+
+def print_json(value: Any) -> None:
+    """Print a result as JSON on standard output; numbers that JSON has no word for are null."""
+    print(json.dumps(_plain(value), indent=2, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(name): _plain(inside) for name, inside in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(inside) for inside in value]
+    if value is None or isinstance(value, (str, bool, int)):
+        return value
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    return str(value)

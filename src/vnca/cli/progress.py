@@ -1,10 +1,14 @@
-"""Progress of long work: how far, how fast, how long still."""
+"""Progress of long work and what came of it: in words for people, as JSON for programs."""
 
+import io
+import json
 import re
 import sys
 import time
 from collections.abc import Iterable, Iterator
-from typing import TypeVar
+from contextlib import contextmanager, redirect_stderr
+from pathlib import Path
+from typing import Any, TextIO, TypeVar
 
 T = TypeVar("T")
 _ARGUMENT = re.compile(r"`([a-z_]+(?:\.[a-z_]+)*)`")
@@ -14,6 +18,69 @@ _REDRAW_SECONDS = 0.2
 _LOG_SECONDS = 15.0
 
 _line_is_open = False
+
+
+class _Notes(io.TextIOBase):
+    """A stream each of whose lines becomes an event of another."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream, self._line = stream, ""
+
+    def write(self, text: str, /) -> int:
+        *lines, self._line = (self._line + text).split("\n")
+        for line in filter(None, (line.strip() for line in lines)):
+            self.add(event="note", text=line)
+        return len(text)
+
+    def add(self, **facts: Any) -> None:
+        """Write an event."""
+        print(json.dumps(facts), file=self.stream, flush=True)
+
+    def end(self) -> None:
+        """Tell of a last line that was not ended."""
+        self.write("\n")
+
+    def fileno(self) -> int:
+        return self.stream.fileno()
+
+
+_notes: _Notes | None = None
+"""Where events go while they are wanted."""
+
+
+@contextmanager
+def json_events(*, wanted: bool) -> Iterator[None]:
+    """Say on standard error what happens as JSON, an object a line, if that is wanted.
+
+    Whatever else is written there becomes notes; docs/guide/automation.md lists the objects.
+    """
+    global _notes
+    if not wanted:
+        yield
+        return
+    before, _notes = _notes, _Notes(sys.stderr)
+    try:
+        with redirect_stderr(_notes):
+            yield
+            _notes.end()
+    finally:
+        _notes = before
+
+
+def event(kind: str, **facts: Any) -> bool:
+    """Tell programs that something happened; False if they do not listen."""
+    if _notes is None:
+        return False
+    _notes.end()
+    _notes.add(event=kind, **facts)
+    return True
+
+
+def made(what: str, path: Path) -> None:
+    """Tell where a result is: `film: painted.mp4`."""
+    if not event("result", what=what, path=str(path)):
+        end_line()
+        print(f"{what}: {path}", file=sys.stderr, flush=True)
 
 
 def as_options(text: str) -> str:
@@ -61,7 +128,8 @@ class Progress:
         """Say that `done` units are finished; `note` is added at the end of the line."""
         global _line_is_open
         now = time.monotonic()
-        pause = _REDRAW_SECONDS if self._terminal else _LOG_SECONDS
+        is_often = self._terminal or _notes is not None
+        pause = _REDRAW_SECONDS if is_often else _LOG_SECONDS
         if now - self._drawn < pause and done < self._total:
             return
         self._drawn = now
@@ -69,6 +137,16 @@ class Progress:
         fresh = max(0, done - self._already)
         left = elapsed / fresh * (self._total - done) if fresh else 0.0
         rate = f"{fresh / elapsed:.2f} {self._unit}/s" if fresh and elapsed > 0 else ""
+        if event(
+            "progress",
+            what=self._what.strip(","),
+            done=done,
+            total=self._total,
+            unit=self._unit,
+            seconds_left=round(left, 1) if fresh else None,
+            note=note,
+        ):
+            return
         line = (
             f"{self._what} {done}/{self._total} {self._unit}  {rate}  {_clock(left)} left  {note}"
         )

@@ -9,6 +9,7 @@ import numpy as np
 import tyro
 
 from vnca.cli.options import parse, say
+from vnca.cli.progress import made
 from vnca.cli.texture_block import BlockConfig, grown_blocks, texture_rule
 from vnca.core.errors import OptionError
 from vnca.core.files import whole_file, writable_file
@@ -81,7 +82,7 @@ def bake_mesh(options: Bake) -> None:
         _colour_vertices(options, rule, mesh, place)
     else:
         _bake(options, rule, mesh, place)
-    say(f"textured: {options.out}")
+    made("textured", options.out)
 
 
 def _bake(options: Bake, rule: Rule, mesh: Mesh, place: Placement) -> None:

@@ -31,6 +31,7 @@ class BlockConfig:
     """What computes the automaton."""
 
     def __post_init__(self) -> None:
+        Compute(self.backend)
         if not SMALLEST <= self.block <= LARGEST:
             raise OptionError(f"--block {self.block}: must be from {SMALLEST} to {LARGEST} cells")
         if self.steps < 1:

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import tyro
 
-from vnca.cli.options import parse, say
-from vnca.cli.progress import tracked
+from vnca.cli.options import parse
+from vnca.cli.progress import made, tracked
 from vnca.cli.texture_block import BlockConfig, grown_blocks, texture_rule
 from vnca.core.errors import OptionError
 from vnca.core.files import writable_file
@@ -71,7 +71,7 @@ def run(arguments: Sequence[str]) -> None:
                 shaders if living else tracked(shaders, "filming", frames, "frames")
             ):
                 film.add(table.picture(frame, shader))
-    say(f"film: {options.out}")
+    made("film", options.out)
 
 
 def _shaders(

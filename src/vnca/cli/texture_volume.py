@@ -8,7 +8,8 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from vnca.cli.options import parse, say
+from vnca.cli.options import parse
+from vnca.cli.progress import made
 from vnca.cli.texture_block import BlockConfig, grown_blocks, texture_rule
 from vnca.core.errors import OptionError
 from vnca.core.files import whole_file, writable_file
@@ -41,7 +42,7 @@ def run(arguments: Sequence[str]) -> None:
     (block,) = grown_blocks(texture_rule(options.model), options.grow)
     write = _write_vdb if options.out.suffix.lower() == ".vdb" else _write_npz
     write(options.out, block)
-    say(f"block: {options.out}")
+    made("block", options.out)
 
 
 def _write_vdb(path: Path, block: FloatArray) -> None:

@@ -1,9 +1,10 @@
 """What long work tells, on the terminal."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 from vnca.cli.options import say
-from vnca.cli.progress import Progress, end_line
+from vnca.cli.progress import Progress, end_line, made
 
 
 class Terminal:
@@ -30,6 +31,10 @@ class Terminal:
     def note(self, line: str) -> None:
         """Print the line."""
         say(line)
+
+    def made(self, what: str, path: Path) -> None:
+        """Print where a result is."""
+        made(what, path)
 
 
 TERMINAL = Terminal()

@@ -1,6 +1,7 @@
 """How long work tells how far it has come: the library prints nothing, whoever calls it may."""
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Protocol, TypeVar
 
 T = TypeVar("T")
@@ -29,6 +30,9 @@ class Watch(Protocol):
     def note(self, line: str) -> None:
         """Something that the user should know, in one line; arguments are in backquotes."""
 
+    def made(self, what: str, path: Path) -> None:
+        """A result is there, whole: what it is, as "film", and its file or folder."""
+
 
 class Silent:
     """A `Watch` that tells nobody."""
@@ -37,6 +41,9 @@ class Silent:
         """Do nothing."""
 
     def note(self, line: str) -> None:
+        """Do nothing."""
+
+    def made(self, what: str, path: Path) -> None:
         """Do nothing."""
 
 

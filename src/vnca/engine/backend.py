@@ -1,7 +1,8 @@
 """Where an automaton is computed: what a backend is, which there are, and a session on one.
 
-A backend is one folder beside this file, whose `BACKEND` is registered in `BACKENDS`. It offers
-sessions: a session holds state, neighbours, conditioning and mask where they are computed.
+A backend is one folder beside this file, with a `BACKEND` in it, and its name in `BACKENDS` of
+`session.py`. It opens sessions, which hold state, neighbours, conditioning and mask where they are
+computed.
 """
 
 import sys
@@ -10,13 +11,10 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.errors import BackendUnavailableError
 from vnca.engine.automaton import Automaton
 from vnca.engine.domain import Domain
 from vnca.engine.session import Compute, Job, Session
-
-BACKENDS = ("native", "triton", "numpy", "reference")
-"""Names of backends, each that of its folder, the fastest on its kind of device first."""
 
 
 class Backend(ABC):
@@ -61,13 +59,7 @@ class Backend(ABC):
 
 
 def backend_named(name: str) -> Backend:
-    """A registered backend.
-
-    Raises:
-        OptionError: If there is none of that name.
-    """
-    if name not in BACKENDS:
-        raise OptionError(f"`backend` {name}: expected auto, {', '.join(BACKENDS)}")
+    """A registered backend, of a name in `BACKENDS`."""
     return import_module(f"vnca.engine.{name}").BACKEND
 
 

@@ -12,6 +12,8 @@ from vnca.core.typing import FloatArray
 from vnca.engine.automaton import Automaton, Weights
 from vnca.engine.domain import Domain
 
+BACKENDS = ("native", "triton", "numpy", "reference")
+"""Names of backends, each that of its folder, the fastest on its kind of device first."""
 PRECISIONS = ("float32", "bfloat16")
 """What a backend may round the factors of its products to; states and sums stay float32."""
 
@@ -31,6 +33,8 @@ class Compute:
     """Threads of the native backend; one for each core unless given."""
 
     def __post_init__(self) -> None:
+        if self.backend not in ("auto", *BACKENDS):
+            raise OptionError(f"`backend` {self.backend}: expected auto, {', '.join(BACKENDS)}")
         if self.precision not in PRECISIONS:
             raise OptionError(f"`precision` {self.precision}: expected {' or '.join(PRECISIONS)}")
         if self.threads is not None and self.threads < 1:

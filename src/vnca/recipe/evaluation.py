@@ -72,6 +72,7 @@ class EvaluateRun:
     """How the rule is applied."""
 
     def __post_init__(self) -> None:
+        Compute(self.backend)
         if self.size < 64:
             raise OptionError(f"`size` {self.size}: at least 64 pixels are needed")
         if self.style_scale is not None:
@@ -235,7 +236,7 @@ def run(
         temporary.write_text(page, encoding="utf-8")
     with whole_file(out / MEASURES_NAME) as temporary:
         temporary.write_text(json.dumps(evaluation.as_json(), indent=2) + "\n")
-    watch.note(f"report: {out / REPORT_NAME}")
+    watch.made("report", out / REPORT_NAME)
     return evaluation
 
 

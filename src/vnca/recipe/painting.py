@@ -77,6 +77,7 @@ class StylizeRun:
     """How the preview is filmed."""
 
     def __post_init__(self) -> None:
+        Compute(self.backend, precision=self.precision)
         for name in ("gamma", "density_scale"):
             value = getattr(self, name)
             if value is not None and not 0 < value < inf:
@@ -205,9 +206,9 @@ def _paint(painter: Painter, options: StylizeRun, watch: Watch) -> Iterator[Path
             watch.note(f"stopped after {done} of {total} frames; `resume` goes on")
             raise
     painter.discard()
-    watch.note(f"painted: {options.out}")
-    if film is not None:
-        watch.note(f"film: {options.preview}")
+    watch.made("painted", options.out)
+    if film is not None and options.preview is not None:
+        watch.made("film", options.preview)
 
 
 def _film(options: StylizeRun, painter: Painter, stack: ExitStack, watch: Watch) -> Film | None:

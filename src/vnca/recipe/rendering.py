@@ -168,14 +168,14 @@ def run(options: RenderRun, watch: Watch) -> None:
     writable_file(options.out)
     if options.strip:
         write_image(options.out, contact_sheet([strip(sequence, options, options.strip)]))
-        watch.note(f"rendered: {options.out}")
+        watch.made("rendered", options.out)
         return
     _require_enough_names(len(sequence), options)
     options = _as_painted(options, sequence)
     bounds = sequence_bounds(sequence, options.smoke)
     shown = tracked(_frames(sequence, options), watch, "rendering", len(sequence), "frames")
     _write(shown, len(sequence), bounds, options)
-    watch.note(f"rendered: {options.out}")
+    watch.made("rendered", options.out)
 
 
 def _require_enough_names(count: int, options: RenderRun) -> None:

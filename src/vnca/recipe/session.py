@@ -180,7 +180,7 @@ class Session:
         self._show()
         folder.finish()
         if folder.path is not None:
-            self.watch.note(f"model: {folder.path}")
+            self.watch.made("model", folder.path)
 
     @property
     def _call(self) -> str:

@@ -79,4 +79,4 @@ def _written(volumes: Iterator[Volume], run: SimulateRun, watch: Watch) -> Itera
             write_smoke(run.out / f"{run.scene}_{volume.frame:04d}.vdb", volume)
         yield volume
     if run.out is not None:
-        watch.note(f"smoke: {run.out}")
+        watch.made("smoke", run.out)

@@ -59,7 +59,7 @@ class SmokeRun(TrainingOptions):
     style: Path
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
     preset: Preset = "draft"
-    """Values of all options below that are not given."""
+    """Values of all hyperparameters that are not given."""
     texture: float | None = None
     """Iterations on a solid texture of the picture for each one on the smoke, made before those:
     patterns come from there. 0 begins with nothing."""

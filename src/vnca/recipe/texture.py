@@ -48,7 +48,7 @@ class TextureRun(TrainingOptions):
     up_axis: UpAxis | None = None
     """The mesh's up axis; y for OBJ and GLB, z for PLY and STL unless given."""
     preset: Preset = "draft"
-    """Values of all options below that are not given."""
+    """Values of all hyperparameters that are not given."""
     config: TextureConfig = field(default_factory=TextureConfig)
     """Hyperparameters."""
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from vnca.core.errors import OptionError
+from vnca.engine.session import Compute
 from vnca.losses.appearance import AppearanceConfig
 from vnca.rule.rule import RuleConfig
 
@@ -76,6 +77,7 @@ class TrainingConfig(ABC):
     """Same seed, same machine, same result."""
 
     def __post_init__(self) -> None:
+        Compute(self.backend)
         if self.iterations < 1:
             raise OptionError(f"`iterations` {self.iterations}: at least 1 is needed")
         if not (0 < self.learning_rate < inf and 0 < self.decay < inf):

@@ -1,4 +1,4 @@
-"""`vnca evaluate FRAME STYLE --ablation velocity --out DIR`."""
+"""`vnca ablate FRAME STYLE --out DIR`."""
 
 import dataclasses
 import json
@@ -11,12 +11,12 @@ import numpy as np
 import tyro
 
 import vnca
-from vnca.cli.options import chosen, parse, say
+from vnca.cli.options import STDOUT, chosen, parse, print_json, say
 from vnca.cli.watch import Terminal
 from vnca.core.errors import OptionError
 from vnca.core.files import existing_file, whole_file, writable_file
 from vnca.core.volume import Volume
-from vnca.features.vgg import VGG16
+from vnca.features.load import load_network
 from vnca.io.picture import read_image
 from vnca.io.smoke import SmokeFormat
 from vnca.metrics.estimators import Estimator, estimators
@@ -38,24 +38,26 @@ from vnca.training.smoke_config import PRESETS, SmokeConfig
 
 
 @dataclass(frozen=True)
-class Ablation:
-    """Train with and without a part of the method, and measure what it does."""
+class Ablate:
+    """Train with and without the motion loss and the velocity, and measure what these do.
+
+    For each seed a rule is trained without the motion loss, one that is not conditioned on the
+    velocity, and one with both.
+    """
 
     frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
     """A frame of smoke with velocity."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
-    ablation: Literal["velocity"]
-    """What is taken away."""
     out: Path
     """Folder for a run of each kind; runs that are there already are not trained again, and runs
     of another frame, picture or options are refused."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """A run of each kind for each seed."""
     preset: Literal["draft", "standard", "paper"] = "draft"
-    """Values of all options below that are not given."""
+    """Values of all hyperparameters that are not given."""
     json: Path | None = None
-    """File for the measures of all runs."""
+    """File for the measures of all runs; - prints them instead of the table."""
     size: int = 128
     """Rows and columns of the views that are measured, pixels."""
     device: str = "auto"
@@ -76,10 +78,8 @@ def run(arguments: Sequence[str]) -> None:
     """Read the options, train and measure."""
     missing: Any = tyro.MISSING
     preset = chosen(arguments, "--preset", "draft")
-    defaults = Ablation(
-        missing, missing, missing, missing, config=PRESETS.get(preset, SmokeConfig())
-    )
-    ablate(parse("evaluate", Ablation, arguments, default=defaults))
+    defaults = Ablate(missing, missing, missing, config=PRESETS.get(preset, SmokeConfig()))
+    ablate(parse("ablate", Ablate, arguments, default=defaults))
 
 
 _VERSION = "version of vnca"
@@ -88,16 +88,16 @@ VARIANTS = {
     "no velocity encoding": (True, False),
     "both": (True, True),
 }
-"""Of the ablation: whether there is a motion loss, and whether cells are told the velocity."""
+"""Whether there is a motion loss, and whether the rule is conditioned on the velocity."""
 
 
-def ablate(options: Ablation) -> None:
+def ablate(options: Ablate) -> None:
     """Train the variants and print how their textures move, mean and spread over the seeds.
 
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
-    if options.json:
+    if options.json and options.json != STDOUT:
         writable_file(options.json)
     seen_by = estimators()
     smoke = _read(options.frame, options.smoke)
@@ -123,15 +123,19 @@ def ablate(options: Ablation) -> None:
         rules.append(Model.load(folder).rule)
         measures = measure_motion(rules[-1], smoke, seen_by, size=options.size)
         found.setdefault(variant, []).append(measures)
+    described = {name: [*map(as_json, runs)] for name, runs in found.items()}
+    if options.json == STDOUT:
+        print_json(described)
+        return
     print(_heading())
     for variant, runs in found.items():
         print(_row(variant, runs))
-    _print_yardsticks(rules[-1], smoke, seen_by, options.size)
+    _print_baselines(rules[-1], smoke, seen_by, options.size)
     if options.json:
-        _write(options.json, {name: [*map(as_json, runs)] for name, runs in found.items()})
+        _write(options.json, described)
 
 
-def _configurations(options: Ablation) -> Iterator[tuple[str, SmokeConfig]]:
+def _configurations(options: Ablate) -> Iterator[tuple[str, SmokeConfig]]:
     for variant, (motion, velocity) in VARIANTS.items():
         config = options.config
         if not motion:
@@ -152,18 +156,18 @@ class _Run(NamedTuple):
     is_trained: bool
 
 
-def _runs(options: Ablation, smoke: Volume) -> list[_Run]:
+def _runs(options: Ablate, smoke: Volume) -> list[_Run]:
     """All trainings, looked up before the first is begun.
 
     Raises:
         VncaError: If the picture cannot be read, or a folder holds a run of something else.
     """
     style = read_image(options.style)
-    vgg = VGG16.load(options.config.features, choose_device(options.device))
+    network = load_network(options.config.features, choose_device(options.device))
     runs = []
     for variant, config in _configurations(options):
         folder = options.out / f"{variant.replace(' ', '_')}-{config.seed}"
-        wanted = training_inputs(smoke, style, config, vgg)
+        wanted = training_inputs(smoke, style, config, network)
         runs.append(_Run(variant, config, folder, _is_trained(folder, wanted, config.iterations)))
     return runs
 
@@ -206,13 +210,13 @@ def as_json(measures: MotionMeasures) -> dict[str, Any]:
     }
 
 
-def _print_yardsticks(
+def _print_baselines(
     rule: Rule, smoke: Volume, seen_by: Mapping[str, Estimator], size: int
 ) -> None:
-    """What the measures say of a texture that follows the smoke, and of one that only drifts."""
+    """What the measures say of noise that the smoke advects, and of a texture that only drifts."""
     drift = "".join(f"{value:>12.3f}" for value in measure_drift(rule, smoke, size=size))
-    print(f"{'drifting as one':22}{drift}{drift}{'-':>12}")
-    print(_row("carried noise", [measure_carried_noise(rule, smoke, seen_by, size=size)]))
+    print(f"{'rigid drift':22}{drift}{drift}{'-':>12}")
+    print(_row("advected noise", [measure_carried_noise(rule, smoke, seen_by, size=size)]))
 
 
 def _heading() -> str:

@@ -24,7 +24,7 @@ def test_the_velocity_ablation_trains_and_compares_three_kinds(
     vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
 ) -> None:
     arguments = (
-        *("evaluate", frame, style, "--ablation", "velocity", "--out", tmp_path / "runs"),
+        *("ablate", frame, style, "--out", tmp_path / "runs"),
         *("--seeds", "0", "1", "--json", tmp_path / "ablation.json", *SMALL, *tiny),
         *("--motion.weight", "0.5"),
     )
@@ -50,7 +50,7 @@ def test_an_ablation_of_motion_needs_a_motion_loss(
     vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
 ) -> None:
     outcome = vnca(
-        *("evaluate", frame, style, "--ablation", "velocity", "--out", tmp_path, *tiny),
+        *("ablate", frame, style, "--out", tmp_path, *tiny),
         *("--motion.weight", "0"),
     )
     assert "--motion.weight" in outcome.complaint
@@ -62,7 +62,7 @@ def ablation(vnca: Vnca, style: Path, tiny: list[str], tmp_path: Path) -> Callab
     """An ablation with one seed in a folder: `ablation(frame, more options)`."""
 
     def run(frame: Path, *options: object, picture: Path = style) -> Any:
-        command = ("evaluate", frame, picture, "--ablation", "velocity", "--seeds", "0")
+        command = ("ablate", frame, picture, "--seeds", "0")
         return vnca(*command, "--out", tmp_path / "runs", *SMALL, *tiny, *options)
 
     return run

@@ -1,0 +1,265 @@
+"""What `--help` and `--help-all` print: the options of a dataclass, all or those asked for most."""
+
+import ast
+import dataclasses
+import inspect
+import re
+import shutil
+import textwrap
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import tyro
+
+SHORT = {
+    "-o": "--out",
+    "-p": "--preset",
+    "-f": "--frames",
+    "-s": "--seed",
+    "-r": "--refine",
+    "-d": "--device",
+}
+"""Short forms, the same in every command that has the option."""
+_SMOKE = ("velocity-units", "fps", "up-axis")
+_FILM = ("film.azimuth", "film.elevation", "film.turn", "film.rows", "film.columns", "film.fps")
+COMMON: Mapping[str, tuple[str, ...]] = {
+    "train": (
+        *("out", "preset", "iterations", "view.size", "seed", "texture", *_SMOKE),
+        *("device", "memory-budget", "overwrite"),
+    ),
+    "stylize": (
+        *("out", "frames", "refine", "preview", "strength", "density-strength", "gamma", "seed"),
+        *("resume", "on-error", *_SMOKE),
+    ),
+    "evaluate": ("out", "frames", "refine", "style", "size", "json"),
+    "ablate": ("out", "preset", "seeds", "iterations", "json", "device", *_SMOKE),
+    "render": (
+        *("out", "frames", "turntable", "strip", "transparent", "gamma"),
+        *(*_FILM, "film.background"),
+    ),
+    "texture train": ("out", "preset", "iterations", "seed", "mesh", "device", "overwrite"),
+    "bench step": ("backends", "threads", "json", "csv"),
+    "bench train": ("preset", "backends", "device", "threads", "repeats", "json", "csv"),
+    "bench stylize": ("model", "sequence", "frames", "backends", "threads", "json", "csv"),
+}
+"""The options that `--help` shows of a command, in its order; of others it shows all."""
+JSON_PROGRESS = "--json-progress"
+_COLUMN = 26
+_WIDTHS = (60, 100)
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option or a positional argument.
+
+    Attributes:
+        name: Without dashes: `film.fps`.
+        group: What it belongs to, a sentence; empty for the command itself.
+        form: What follows it: `{1,2,3,4}`; empty for a flag.
+        text: What it does.
+        default: As it is written on the command line; empty where there is nothing to tell.
+        is_positional: Whether it is given without its name.
+        is_required: Whether it has to be given.
+        is_flag: Whether it is given without a value.
+    """
+
+    name: str
+    group: str
+    form: str
+    text: str
+    default: str
+    is_positional: bool
+    is_required: bool
+    is_flag: bool
+
+    def head(self) -> str:
+        """How it is written: `-o, --out PATH`."""
+        if self.is_positional:
+            return self.form
+        long = f"--{self.name}"
+        short = [word for word, meant in SHORT.items() if meant == long]
+        forms = ", ".join([*short, long])
+        if self.is_flag and self.default == "on":
+            before, _, last = self.name.rpartition(".")
+            forms += f", --{before}{'.' * bool(before)}no-{last}"
+        return f"{forms} {self.form}".rstrip()
+
+    def told(self) -> str:
+        """What is said of it."""
+        note = f"default: {self.default}" if self.default else ""
+        note = "required" if self.is_required else note
+        return f"{self.text} ({note})" if note and not self.is_positional else self.text
+
+
+def help_text(
+    command: str, kind: type, default: Any = None, *, all_of_them: bool, separator: str = " "
+) -> str:
+    """The help of a command.
+
+    Args:
+        command: As it is called, without `vnca`.
+        kind: The dataclass of its options.
+        default: An instance whose values are the defaults, rather than those of the fields.
+        all_of_them: Whether all options are shown, or those that are asked for most.
+        separator: What stands between the values of an option that takes several.
+    """
+    options = list(_options(kind, default, separator=separator))
+    names = {option.name for option in options}
+    positional = [option for option in options if option.is_positional]
+    named = [option for option in options if not option.is_positional]
+    # Not of the dataclass where a command has two, as that of going on with a training.
+    common = [name for name in COMMON.get(command, ()) if name in names]
+    shown = sorted(named, key=lambda option: _rank(option.name, common))
+    if common and not all_of_them:
+        shown = [option for option in shown if option.name in common]
+        shown = [dataclasses.replace(option, group="") for option in shown]
+    call = " ".join(["usage: vnca", command, "[OPTIONS]", *(option.form for option in positional)])
+    width = min(max(shutil.get_terminal_size((80, 24)).columns, _WIDTHS[0]), _WIDTHS[1])
+    parts = [call, *_paragraphs(inspect.getdoc(kind) or "", width)]
+    if positional:
+        parts.append("\n".join(_entry(o.form, _meant(o, names), width) for o in positional))
+    for group in sorted(dict.fromkeys(option.group for option in shown), key=bool):
+        title = "\n".join(textwrap.wrap(group.rstrip(".") + ":", width)) if group else "options:"
+        entries = [_entry(o.head(), _meant(o, names), width) for o in shown if o.group == group]
+        parts.append("\n".join([title, *entries]))
+    always = {
+        JSON_PROGRESS: "Say what happens as JSON, an object a line on standard error.",
+        "-h, --help": "Show the options that are asked for most." if common else "Show this.",
+    }
+    if common:
+        always["--help-all"] = f"Show all {len(named)} options."
+    parts.append("\n".join(_entry(name, text, width) for name, text in always.items()))
+    return "\n\n".join(parts)
+
+
+def _rank(name: str, common: list[str]) -> int:
+    return common.index(name) if name in common else len(common)
+
+
+def _paragraphs(text: str, width: int) -> list[str]:
+    return ["\n".join(textwrap.wrap(paragraph, width)) for paragraph in text.split("\n\n")]
+
+
+def _entry(head: str, text: str, width: int) -> str:
+    lines = textwrap.wrap(text, width - _COLUMN, break_on_hyphens=False) or [""]
+    begin = f"  {head}"
+    if len(begin) > _COLUMN - 2:
+        lines.insert(0, "")
+    first, *others = lines
+    return "\n".join([f"{begin:{_COLUMN}}{first}".rstrip(), *(" " * _COLUMN + o for o in others)])
+
+
+def _meant(option: Option, names: Collection[str]) -> str:
+    """What an option does, with the options that it speaks of as they are written."""
+    before = option.name.rpartition(".")[0]
+
+    def written(found: re.Match[str]) -> str:
+        name = found[1].replace("_", "-")
+        for known in (f"{before}.{name}", name):
+            if known in names:
+                return f"--{known}"
+        return found[0]
+
+    return re.sub(r"`([a-z_.]+)`", written, option.told())
+
+
+def _options(
+    kind: type, default: Any, prefix: str = "", group: str = "", separator: str = " "
+) -> Iterator[Option]:
+    hints, texts = get_type_hints(kind, include_extras=True), _texts(kind)
+    for field in dataclasses.fields(kind):
+        hint: Any = hints[field.name]
+        marks: tuple[Any, ...] = ()
+        if get_origin(hint) is Annotated:
+            hint, *rest = get_args(hint)
+            marks = tuple(rest)
+        value = _value(field, default)
+        named = next((n for n in (getattr(m, "name", None) for m in marks) if n is not None), None)
+        name = prefix + (field.name.replace("_", "-") if named is None else named)
+        if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+            inside = f"{name}." if named != "" else prefix
+            title = (inspect.getdoc(hint) or "").partition("\n\n")[0]
+            yield from _options(hint, value, inside, title, separator)
+            continue
+        is_missing = value is dataclasses.MISSING or value is tyro.MISSING
+        metavar = next((m.metavar for m in marks if getattr(m, "metavar", None)), None)
+        yield Option(
+            name,
+            group,
+            "" if hint is bool else metavar or _form(hint, separator),
+            " ".join(texts.get(field.name, "").split()),
+            "" if is_missing else _written(value, separator),
+            is_positional=any(mark is _POSITIONAL for mark in marks),
+            is_required=is_missing,
+            is_flag=hint is bool,
+        )
+
+
+_POSITIONAL: Any = list(get_args(tyro.conf.Positional[int]))[1]
+
+
+def _value(field: "dataclasses.Field[Any]", default: Any) -> Any:
+    if default not in (None, dataclasses.MISSING, tyro.MISSING):
+        return getattr(default, field.name)
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return field.default
+
+
+def _form(hint: Any, separator: str) -> str:
+    """How a value of a type is written on the command line."""
+    origin: Any = get_origin(hint)
+    inside: list[Any] = list(get_args(hint))
+    if origin is Annotated:
+        return _form(inside[0], separator)
+    if origin is Literal:
+        return "{" + ",".join(map(str, inside)) + "}" if len(inside) > 1 else str(inside[0])
+    if origin in (Union, UnionType):
+        return "|".join(_form(one, separator) for one in inside if one is not type(None))
+    if origin is tuple and inside[-1] is not Ellipsis:
+        return "XxYxZ"
+    if origin is tuple:
+        one = _form(inside[0], separator)
+        return f"{one}{separator}…" if separator.strip() else f"{one} …"
+    names: dict[Any, str] = {bool: "{True,False}", Path: "PATH", str: "TEXT"}
+    return names.get(hint) or hint.__name__.upper()
+
+
+def _written(value: Any, separator: str) -> str:
+    if value is None or value is False:
+        return ""
+    if value is True:
+        return "on"
+    if isinstance(value, tuple):
+        joint = "x" if _is_grid(value) else separator
+        return joint.join(_written(one, separator) for one in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _is_grid(value: tuple[Any, ...]) -> bool:
+    return len(value) == 3 and all(type(one) is int for one in value)
+
+
+def _texts(kind: type) -> dict[str, str]:
+    """The string under each field of a dataclass, and of those that it is made of, by name."""
+    found: dict[str, str] = {}
+    for one in reversed(kind.__mro__):
+        if not dataclasses.is_dataclass(one):
+            continue
+        try:
+            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(one))).body
+        except (OSError, TypeError):  # installed without its source
+            continue
+        assert isinstance(tree, ast.ClassDef)
+        for field, text in zip(tree.body, tree.body[1:], strict=False):
+            if (
+                isinstance(field, ast.AnnAssign)
+                and isinstance(field.target, ast.Name)
+                and isinstance(text, ast.Expr)
+                and isinstance(text.value, ast.Constant)
+            ):
+                found[field.target.id] = str(text.value.value)
+    return found
