@@ -19,7 +19,7 @@ from vnca.core.watch import SILENT, Watch, tracked
 from vnca.engine.session import Compute
 from vnca.features.load import load_network
 from vnca.io.picture import read_image, style_array
-from vnca.io.sequence import format_frames
+from vnca.io.sequence import FrameSequence, format_frames
 from vnca.io.smoke import SmokeFormat, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY
 from vnca.metrics.judges import Judge
@@ -207,9 +207,13 @@ def run(
     """
     out = None if options.out is None else writable_folder(options.out)
     picture = _picture(options, model)
-    width = _compared_width(options, model)
+    sequence = None
     if given is None:
-        given = _files(options, model, watch)
+        sequence = open_sequence(_sequence(options, model), options.frames, watch)
+    width = _compared_width(options, model)
+    if sequence is not None:
+        given = _files(sequence, options, watch)
+    assert given is not None, "it was given, or else there is a sequence"
     rule = placed(model.rule, given.region, watch)
     refine = options.refine
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.
@@ -240,8 +244,7 @@ def run(
     return evaluation
 
 
-def _files(options: EvaluateRun, model: Model, watch: Watch) -> _Smoke:
-    sequence = open_sequence(_sequence(options, model), options.frames, watch)
+def _files(sequence: FrameSequence, options: EvaluateRun, watch: Watch) -> _Smoke:
     smoke = with_fitted_scale(options.smoke, sequence)
     still = dataclasses.replace(smoke, velocity_grid=NO_VELOCITY)
     region = sequence_region(sequence, smoke, watch)
@@ -338,6 +341,6 @@ def _sequence(options: EvaluateRun, model: Model) -> str:
     if path is None:
         raise OptionError(
             f"{options.run}: does not tell where the smoke is that it was trained on; "
-            "name a `sequence`"
+            "name a sequence"
         )
     return str(path)
