@@ -18,6 +18,16 @@ def test_importing_is_light() -> None:
     assert not loaded & {"torch", "numpy", "scipy", "PIL", "tyro", "jaxtyping", "safetensors"}
 
 
+@pytest.mark.parametrize("folder", ["benchmarks", "docs", "examples"])
+def test_what_is_not_the_command_line_does_without_it(folder: str) -> None:
+    # Help is printed by the documentation, and the gallery is made as its readers would.
+    callers = {"docs/conf.py", "docs/gallery/workshop.py"}
+    top = Path(__file__).parents[1]
+    for path in sorted((top / folder).rglob("*.py")):
+        if path.relative_to(top).as_posix() not in callers:
+            assert "vnca.cli" not in path.read_text(), path
+
+
 @pytest.mark.parametrize("name", vnca.__all__)
 def test_every_name_is_there_and_listed(name: str) -> None:
     assert getattr(vnca, name) is not None
@@ -27,9 +37,11 @@ def test_every_name_is_there_and_listed(name: str) -> None:
 def test_a_name_is_the_thing_itself() -> None:
     from vnca.core.volume import Volume
     from vnca.painting.roll import stylize
+    from vnca.recipe import stylizing
     from vnca.rendering.view import render
 
     assert vnca.Volume is Volume
+    assert vnca.stylize is stylizing.stylize
     assert vnca.render_view is render
     assert vnca.stylize_frames is stylize
 
@@ -37,7 +49,7 @@ def test_a_name_is_the_thing_itself() -> None:
 def test_no_name_is_hidden_by_a_subpackage() -> None:
     modules = {path.stem for path in ROOT.iterdir()}
     assert not modules & set(vnca.__all__)
-    for module in sorted(modules - {"__init__", "__pycache__", "data"}):
+    for module in sorted(modules - {"__init__", "__main__", "__pycache__", "data"}):
         importlib.import_module(f"vnca.{module}")
     assert all(not hasattr(getattr(vnca, name), "__path__") for name in vnca.__all__)
 

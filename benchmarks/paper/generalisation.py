@@ -15,11 +15,11 @@ from typing import TypeVar
 
 import numpy as np
 from judge import PAINTED, UNPAINTED, Judge, magnified, paint
-from study import REFERENCE, Findings, Study, run
+from study import REFERENCE, Findings, Lines, Study, run
 
-from vnca.cli.sequence import open_sequence, sequence_region, volumes
-from vnca.cli.simulate import Simulate, write_simulation
 from vnca.painting.roll import Painting, stylize
+from vnca.recipe import simulation
+from vnca.recipe.sequence import open_sequence, sequence_region, volumes
 from vnca.rule.rule import Rule
 from vnca.simulation.scenes import simulate
 
@@ -78,7 +78,8 @@ def generalise(study: Generalisation) -> None:
 def on_plume(study: Generalisation) -> Generalisation:
     """The same study of a simulated plume."""
     folder = study.out / "smoke"
-    write_simulation(Simulate("plume", folder, RESOLUTION, FRAMES, seed=0))
+    for _ in simulation.simulate("plume", out=folder, resolution=RESOLUTION, frames=FRAMES, seed=0):
+        pass
     return replace(
         study,
         frame=folder / f"plume_{TRAINED:04d}.vdb",
@@ -89,8 +90,8 @@ def on_plume(study: Generalisation) -> Generalisation:
 
 def painted(study: Generalisation, rule: Rule) -> Iterator[Painting]:
     """The sequence as the rule paints it."""
-    sequence = open_sequence(str(study.sequence), study.frames)
-    lattice, box = sequence_region(sequence, study.smoke)
+    sequence = open_sequence(str(study.sequence), study.frames, Lines())
+    lattice, box = sequence_region(sequence, study.smoke, Lines())
     frames = volumes(sequence, study.smoke, lattice)
     return stylize(frames, rule, PAINTED, box=box)
 

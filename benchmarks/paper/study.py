@@ -15,15 +15,17 @@ import tyro
 
 from vnca.bench.machine import run_facts
 from vnca.bench.records import append_csv
-from vnca.cli.session import choose_device
-from vnca.cli.train import Train, train
 from vnca.core.errors import OptionError, VncaError
 from vnca.core.files import existing_file, writable_folder
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
+from vnca.core.watch import Silent
 from vnca.io.picture import write_image
 from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.losses.appearance import AppearanceConfig
+from vnca.recipe.session import choose_device
+from vnca.recipe.smoke import SmokeRun
+from vnca.recipe.smoke import run as train
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule, RuleConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME
@@ -133,9 +135,9 @@ class Study:
         if anew or not is_finished(folder):
             print(f"{name}, seed {seed}: {folder}", file=sys.stderr, flush=True)
             train(
-                Train(
-                    self.frame,
-                    self.style,
+                SmokeRun(
+                    frame=self.frame,
+                    style=self.style,
                     out=folder,
                     overwrite=True,
                     preview_every=config.iterations,
@@ -144,7 +146,8 @@ class Study:
                     texture=0,  # as the paper trains
                     smoke=self.smoke,
                     config=config,
-                )
+                ),
+                Lines(),
             )
         return Model.load(folder).rule
 
@@ -160,6 +163,14 @@ class Study:
         path = writable_folder(self.out) / f"{name}.png"
         write_image(path, sheet)
         print(f"pictures: {path}")
+
+
+class Lines(Silent):
+    """Tells what a training has to say, and not how far it is."""
+
+    def note(self, line: str) -> None:
+        """Print the line."""
+        print(line, file=sys.stderr, flush=True)
 
 
 def is_finished(folder: Path) -> bool:

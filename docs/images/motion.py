@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vnca.cli.film import FilmConfig
-from vnca.cli.render import Render, strip
-from vnca.cli.sequence import open_sequence
+from vnca.core.watch import SILENT
 from vnca.io.picture import write_image
+from vnca.recipe.film import FilmConfig
+from vnca.recipe.rendering import RenderRun, strip
+from vnca.recipe.sequence import open_sequence
 
 SIZE = 384
 FRAME = 16
@@ -31,8 +32,10 @@ def main(out: str, *folders: str) -> None:
     view = FilmConfig(rows=SIZE, columns=SIZE)
     panels = []
     for painted in folders:
-        sequence = open_sequence(painted, None)
-        frames = strip(sequence, Render(painted, Path(out), film=view), len(sequence))
+        sequence = open_sequence(painted, None, SILENT)
+        frames = strip(
+            sequence, RenderRun(sequence=painted, out=Path(out), film=view), len(sequence)
+        )
         passing = np.stack([frame[ROWS, LINE].mean(axis=1) for frame in frames], axis=1)
         panels += [np.repeat(passing, FRAME, axis=1), np.ones((len(passing), GAP, 3))]
     write_image(Path(out), np.concatenate(panels[:-1], axis=1).astype(np.float32))

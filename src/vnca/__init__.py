@@ -11,10 +11,11 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from vnca.core.camera import Orthographic, Perspective, frame_box
-    from vnca.core.errors import VncaError
+    from vnca.core.errors import Cancelled, VncaError
     from vnca.core.lattice import Lattice
     from vnca.core.typing import Box
     from vnca.core.volume import Volume
+    from vnca.core.watch import Watch
     from vnca.features.load import load_network
     from vnca.io.film import FilmWriter
     from vnca.io.picture import read_image, write_image
@@ -24,6 +25,14 @@ if TYPE_CHECKING:
     from vnca.painting.config import StylizeConfig
     from vnca.painting.roll import Painting
     from vnca.painting.roll import stylize as stylize_frames
+    from vnca.recipe.evaluation import Evaluation, evaluate
+    from vnca.recipe.film import FilmConfig
+    from vnca.recipe.recorded import load
+    from vnca.recipe.rendering import render
+    from vnca.recipe.simulation import simulate
+    from vnca.recipe.smoke import train
+    from vnca.recipe.stylizing import PaintedFrame, stylize
+    from vnca.recipe.texture import texture
     from vnca.rendering.view import View
     from vnca.rendering.view import render as render_view
     from vnca.rule.model import Model
@@ -32,10 +41,24 @@ if TYPE_CHECKING:
     from vnca.training.loop import Trainer
     from vnca.training.smoke_config import PRESETS, SmokeConfig
     from vnca.training.smoke_trainer import smoke_trainer
+    from vnca.training.texture_config import TextureConfig
 
 # Functions that share the name of a subpackage have one of their own here: an imported
 # subpackage takes its name in this one.
 _HOMES = {
+    "train": "recipe.smoke",
+    "texture": "recipe.texture",
+    "stylize": "recipe.stylizing",
+    "simulate": "recipe.simulation",
+    "render": "recipe.rendering",
+    "load": "recipe.recorded",
+    "evaluate": "recipe.evaluation",
+    "TextureConfig": "training.texture_config",
+    "PaintedFrame": "recipe.stylizing",
+    "Evaluation": "recipe.evaluation",
+    "FilmConfig": "recipe.film",
+    "Watch": "core.watch",
+    "Cancelled": "core.errors",
     "Box": "core.typing",
     "FilmWriter": "io.film",
     "Lattice": "core.lattice",
@@ -74,10 +97,14 @@ _HOMES = {
 __all__ = [
     "PRESETS",
     "Box",
+    "Cancelled",
+    "Evaluation",
+    "FilmConfig",
     "FilmWriter",
     "Lattice",
     "Model",
     "Orthographic",
+    "PaintedFrame",
     "Painting",
     "Perspective",
     "Rule",
@@ -86,21 +113,30 @@ __all__ = [
     "SmokeConfig",
     "SmokeFormat",
     "StylizeConfig",
+    "TextureConfig",
     "Trainer",
     "View",
     "VncaError",
     "Volume",
+    "Watch",
+    "evaluate",
     "find_frames",
     "frame_box",
+    "load",
     "load_network",
     "open_vdb",
     "read_image",
     "read_smoke",
+    "render",
     "render_view",
+    "simulate",
     "simulate_smoke",
     "smoke_box",
     "smoke_trainer",
+    "stylize",
     "stylize_frames",
+    "texture",
+    "train",
     "write_image",
     "write_painted",
     "write_smoke",

@@ -49,7 +49,7 @@ def no_long_work(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(network, "load", begin)
     monkeypatch.setattr(Trainer, "improve", begin)
     monkeypatch.setattr("vnca.painting.roll.Roll.paint", begin)
-    monkeypatch.setattr("vnca.cli.render.read_colour", begin)
+    monkeypatch.setattr("vnca.recipe.rendering.read_colour", begin)
 
 
 def rewritten(path: Path, grids: Callable[[dict[str, Grid]], list[Grid]]) -> None:

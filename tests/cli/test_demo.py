@@ -1,5 +1,4 @@
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +8,10 @@ from PIL import Image
 
 from vnca.cli import demo
 from vnca.cli.demo import Demo
-from vnca.cli.simulate import Simulate, write_simulation
-from vnca.cli.stylize import Stylize, paint
+from vnca.core.volume import Volume
 from vnca.losses.appearance import AppearanceConfig
+from vnca.recipe.simulation import Scene, simulate
+from vnca.recipe.stylizing import PaintedFrame, stylize
 from vnca.rule.rule import RuleConfig
 from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
@@ -40,19 +40,18 @@ def assert_complete(folder: Path, outcome: Any) -> None:
 def test_the_demo_makes_smoke_rule_painting_film_and_sheet(
     vnca: Vnca, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def small(options: Simulate) -> None:
-        write_simulation(replace(options, resolution=12))
+    def small(scene: Scene, **asked: Any) -> Iterator[Volume]:
+        return simulate(scene, **{**asked, "resolution": 12})
 
-    def rough(options: Stylize) -> None:
-        film = replace(options.film, rows=32, columns=32)
-        config = replace(options.config, warmup=2, steps_per_frame=1)
-        paint(replace(options, film=film, config=config))
+    def rough(*inputs: Any, **asked: Any) -> Iterator[PaintedFrame]:
+        film = {"rows": 32, "columns": 32}
+        return stylize(*inputs, **asked, film=film, warmup=2, steps_per_frame=1)
 
     def config(_: Demo) -> SmokeConfig:
         return TINY
 
-    monkeypatch.setattr(demo, "write_simulation", small)
-    monkeypatch.setattr(demo, "paint", rough)
+    monkeypatch.setattr(demo, "simulate", small)
+    monkeypatch.setattr(demo, "stylize", rough)
     monkeypatch.setattr(demo, "_config", config)
     monkeypatch.setattr(demo, "SHEET_SIZE", 32)
     folder = tmp_path / "demo"

@@ -138,7 +138,7 @@ def test_a_judge_that_is_not_installed_is_left_out_with_a_reason(
             raise BackendUnavailableError("features 'edges': not installed")
         return load_network(name)
 
-    monkeypatch.setattr("vnca.cli.evaluate.load_network", load)
+    monkeypatch.setattr("vnca.recipe.evaluation.load_network", load)
     out = ("--out", tmp_path, "--style", style, "--velocity-grid", "none", *SMALL)
     assert vnca("evaluate", model, frame, *out).code == 0
     measures = json.loads((tmp_path / "report.json").read_text())

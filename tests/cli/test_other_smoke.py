@@ -192,7 +192,7 @@ def test_a_rule_trained_without_velocity_is_never_told_one(
         seen.append(config)
         raise OptionError("far enough")
 
-    monkeypatch.setattr("vnca.cli.train.smoke_trainer", far_enough)
+    monkeypatch.setattr("vnca.recipe.smoke.smoke_trainer", far_enough)
     outcome = vnca("train", frame, style, "--out", tmp_path / "run", *options)
     *told, last = outcome.err.splitlines()
     assert last == "vnca: far enough"

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vnca.cli.sequence import read_alone
 from vnca.core.lattice import Lattice
 from vnca.core.typing import AnyArray, Index
 from vnca.core.volume import Volume
+from vnca.core.watch import SILENT
 from vnca.features.vgg import VGG16
 from vnca.io.picture import fit, read_image
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
@@ -23,6 +23,7 @@ from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 from vnca.losses.appearance import AppearanceConfig
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import stylize
+from vnca.recipe.sequence import read_alone
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule, RuleConfig, Scales
 from vnca.training.smoke_config import SmokeConfig, ViewConfig
@@ -101,7 +102,7 @@ def rule(position_prior: bool = False) -> Rule:
 
 def paint(source: Path, form: SmokeFormat, target: Path) -> None:
     """A frame as a sequence, painted as `vnca stylize` does."""
-    smoke = read_alone(source, form)
+    smoke = read_alone(source, form, SILENT)
     config = StylizeConfig(warmup=6, steps_per_frame=2)
     (painting,) = stylize([smoke], rule(), config, box=smoke.box)
     lattice = Lattice(smoke.index_to_world)
@@ -128,7 +129,8 @@ def test_smoke_is_read_and_painted_alike_however_its_cells_are_counted(
     plain = written(tmp_path / "plain.vdb", tiny_smoke, np.eye(3, dtype=int), (0, 0, 0), "z", units)
     form = written(tmp_path / "other.vdb", tiny_smoke, turn, step, up, units)
     expected, got = (
-        read_alone(tmp_path / name, f) for name, f in (("plain.vdb", plain), ("other.vdb", form))
+        read_alone(tmp_path / name, f, SILENT)
+        for name, f in (("plain.vdb", plain), ("other.vdb", form))
     )
     np.testing.assert_array_equal(got.density, expected.density)
     np.testing.assert_allclose(got.velocity, expected.velocity, rtol=1e-5, atol=1e-6)  # type: ignore[arg-type]

@@ -434,7 +434,7 @@ def test_smoke_is_read_as_it_was_for_training_unless_told_otherwise(
     recorded = asdict(SmokeFormat(velocity_units="mantaflow", fps=30, time_scale=0.4))
     Model(rule, {"smoke": recorded}).save(tmp_path / "model.safetensors")
     seen: list[Stylize] = []
-    monkeypatch.setattr("vnca.cli.stylize.paint", lambda options, _: seen.append(options))
+    monkeypatch.setattr("vnca.recipe.painting.run", lambda options, *_: seen.append(options) or ())
     command = ["stylize", str(tmp_path / "model.safetensors"), "smoke", "--out", "out"]
     assert main(command) == 0
     assert main([*command, "--fps", "25", "--velocity-units", "m/s"]) == 0

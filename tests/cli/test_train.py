@@ -114,7 +114,7 @@ def test_what_is_given_wins_over_the_preset_wherever_it_stands(
     place: str,
 ) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr("vnca.cli.train.train", asked.append)
+    monkeypatch.setattr("vnca.recipe.smoke.run", lambda options, _: asked.append(options))
     given = ["--hidden", 24, "--view.step", 0.5]
     preset = {
         "joined": ["--preset=paper"],

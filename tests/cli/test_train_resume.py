@@ -293,7 +293,7 @@ def test_a_texture_that_is_to_be_overwritten_is_not_taken_for_the_new_one(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("vnca.cli.texture_train.train", stop)
+        patch.setattr("vnca.recipe.texture.run", stop)
         vnca("train", frame, style, "--out", run, *options, "--overwrite")
     assert vnca("train", "--resume", run).code == 0
     assert (run / MODEL_NAME).read_bytes() == (whole / MODEL_NAME).read_bytes()

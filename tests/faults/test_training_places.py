@@ -115,7 +115,7 @@ def test_a_disk_that_is_full_from_the_start_is_told(
 def test_a_read_only_disk_is_refused_before_work(
     train: Train, disk: Path, remount: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vnca.cli.train.read_style", lambda _: pytest.fail("worked"))
+    monkeypatch.setattr("vnca.recipe.smoke.read_style", lambda _: pytest.fail("worked"))
     remount("ro")
     code, complaint = train("--out", disk / "out")
     assert code == 2

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import torch
 
-import vnca.cli.train  # noqa: F401
+import vnca.recipe.smoke  # noqa: F401
 from vnca.training import preview
 from vnca.training.checkpoint import Thrift
 

@@ -12,9 +12,7 @@ import tyro
 
 import vnca
 from vnca.cli.options import STDOUT, chosen, parse, print_json, say
-from vnca.cli.sequence import beside, read_alone
-from vnca.cli.session import FINGERPRINTS, choose_device
-from vnca.cli.train import Train, train, training_inputs
+from vnca.cli.watch import Terminal
 from vnca.core.errors import OptionError
 from vnca.core.files import existing_file, whole_file, writable_file
 from vnca.core.volume import Volume
@@ -28,6 +26,10 @@ from vnca.metrics.motion import (
     measure_drift,
     measure_motion,
 )
+from vnca.recipe.sequence import beside, read_alone
+from vnca.recipe.session import FINGERPRINTS, choose_device
+from vnca.recipe.smoke import SmokeRun, training_inputs
+from vnca.recipe.smoke import run as train
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule
 from vnca.training.checkpoint import CHECKPOINT_NAME
@@ -105,9 +107,9 @@ def ablate(options: Ablate) -> None:
         if not is_trained:
             say(f"{variant}, seed {config.seed}: {folder}")
             train(
-                Train(
-                    options.frame,
-                    options.style,
+                SmokeRun(
+                    frame=options.frame,
+                    style=options.style,
                     out=folder,
                     preset=options.preset,
                     texture=0,  # as the paper trains
@@ -115,7 +117,8 @@ def ablate(options: Ablate) -> None:
                     device=options.device,
                     smoke=options.smoke,
                     config=config,
-                )
+                ),
+                Terminal(),
             )
         rules.append(Model.load(folder).rule)
         measures = measure_motion(rules[-1], smoke, seen_by, size=options.size)
@@ -239,7 +242,7 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def _read(frame: Path, smoke: SmokeFormat) -> Volume:
-    return read_alone(existing_file(frame), beside(frame, smoke))
+    return read_alone(existing_file(frame), beside(frame, smoke), Terminal())
 
 
 def _write(path: Path, measures: dict[str, Any]) -> None:

@@ -19,12 +19,13 @@ from vnca.bench.stylize import (
 )
 from vnca.cli.bench_options import Rows, Tables, parse_bench, short
 from vnca.cli.options import say
-from vnca.cli.sequence import open_sequence
+from vnca.cli.watch import Terminal
 from vnca.core.errors import OptionError
 from vnca.engine.backend import choose
 from vnca.engine.native.step import default_threads
 from vnca.engine.session import Compute
 from vnca.io.smoke import SmokeFormat, with_fitted_scale
+from vnca.recipe.sequence import open_sequence
 from vnca.rule.model import Model
 
 
@@ -112,7 +113,7 @@ def _painted(options: BenchStylize, folder: Path) -> PaintedSequence:
         smoke = SmokeFormat()
     else:
         rule = Model.load(options.model).rule
-        sequence = open_sequence(options.sequence, options.frames)
+        sequence = open_sequence(options.sequence, options.frames, Terminal())
         smoke = with_fitted_scale(options.smoke, sequence)
     return PaintedSequence.read(rule, sequence, smoke, steps=options.steps_per_frame)
 

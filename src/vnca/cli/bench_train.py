@@ -15,8 +15,7 @@ from vnca.bench.train import Training, measure_training
 from vnca.cli.bench_options import Rows, Tables, parse_bench, short
 from vnca.cli.demo import STYLE
 from vnca.cli.options import say
-from vnca.cli.sequence import beside, read_alone
-from vnca.cli.session import choose_device
+from vnca.cli.watch import Terminal
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
@@ -24,6 +23,8 @@ from vnca.engine.native.step import default_threads
 from vnca.features.load import load_network
 from vnca.io.picture import read_style
 from vnca.io.smoke import SmokeFormat
+from vnca.recipe.sequence import beside, read_alone
+from vnca.recipe.session import choose_device
 from vnca.simulation.scenes import simulate
 from vnca.training.memory import memory_budget
 from vnca.training.smoke_config import PRESETS, SmokeConfig
@@ -121,7 +122,7 @@ def bench_train(options: BenchTrain) -> None:
 
 def _smoke(options: BenchTrain) -> Volume:
     if options.frame is not None:
-        return read_alone(options.frame, beside(options.frame, options.smoke))
+        return read_alone(options.frame, beside(options.frame, options.smoke), Terminal())
     say("simulating a plume")
     *_, frame = simulate("plume", resolution=options.resolution, frames=_FRAME, seed=0)
     return frame

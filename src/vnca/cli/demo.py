@@ -6,16 +6,19 @@ from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from vnca.cli.film import FilmConfig
 from vnca.cli.options import parse, say
-from vnca.cli.render import Render, strip
-from vnca.cli.sequence import open_sequence
-from vnca.cli.simulate import Simulate, write_simulation
-from vnca.cli.stylize import Stylize, paint
-from vnca.cli.train import Train, train
+from vnca.cli.watch import Terminal
 from vnca.core.typing import FloatArray
+from vnca.core.watch import Watch
 from vnca.io.picture import fit, read_style, write_image
 from vnca.io.sheet import contact_sheet
+from vnca.recipe.film import FilmConfig
+from vnca.recipe.rendering import RenderRun, strip
+from vnca.recipe.sequence import open_sequence
+from vnca.recipe.simulation import simulate
+from vnca.recipe.smoke import SmokeRun
+from vnca.recipe.smoke import run as train
+from vnca.recipe.stylizing import stylize
 from vnca.training.smoke_config import PRESETS, SmokeConfig
 
 STYLE = "vangogh_cafe_terrace.webp"
@@ -57,25 +60,36 @@ def demonstrate(options: Demo) -> None:
     with as_file(files("vnca.data") / STYLE) as own:
         style = options.style or own
         picture = read_style(style)
-        write_simulation(Simulate("plume", smoke, resolution, frames, options.seed))
-        trained = smoke / f"plume_{3 * frames // 4:04d}.vdb"
-        train(
-            Train(
-                trained,
-                style,
-                out=run_folder,
-                overwrite=True,
-                texture=1.0 if options.quick else None,
-                config=_config(options),
-            )
+        watch = Terminal()
+        scene = simulate(
+            "plume", out=smoke, resolution=resolution, frames=frames, seed=options.seed, watch=watch
         )
-        sequence = str(smoke / "plume_####.vdb")
-        asked = f"{frames // 4}-{frames}"
-        refine = 1 if options.quick else 2
-        paint(Stylize(run_folder, sequence, painted, frames=asked, preview=film, refine=refine))
+        for _ in scene:
+            pass
+        asked = SmokeRun(
+            frame=smoke / f"plume_{3 * frames // 4:04d}.vdb",
+            style=style,
+            out=run_folder,
+            overwrite=True,
+            texture=1.0 if options.quick else None,
+            config=_config(options),
+        )
+        train(asked, watch)
+        shown = f"{frames // 4}-{frames}"
+        painting = stylize(
+            run_folder,
+            smoke / "plume_####.vdb",
+            out=painted,
+            frames=shown,
+            preview=film,
+            refine=1 if options.quick else 2,
+            watch=watch,
+        )
+        for _ in painting:
+            pass
         view = FilmConfig(rows=SHEET_SIZE, columns=SHEET_SIZE)
-        shown = Render(str(painted), sheet, frames=asked, film=view)
-        write_image(sheet, _sheet(picture, shown))
+        seen = RenderRun(sequence=str(painted), out=sheet, frames=shown, film=view)
+        write_image(sheet, _sheet(picture, seen, watch))
     minutes, seconds = divmod(round(time.monotonic() - start), 60)
     say(f"done in {minutes}:{seconds:02}")
     print(f"film:          {film}\ncontact sheet: {sheet}")
@@ -94,7 +108,7 @@ def _config(options: Demo) -> SmokeConfig:
     )
 
 
-def _sheet(style: FloatArray, options: Render) -> FloatArray:
+def _sheet(style: FloatArray, options: RenderRun, watch: Watch) -> FloatArray:
     """The style and four frames of the painting, side by side."""
-    frames = strip(open_sequence(options.sequence, options.frames), options, 4)
+    frames = strip(open_sequence(options.sequence, options.frames, watch), options, 4)
     return contact_sheet([[fit(style, SHEET_SIZE, SHEET_SIZE), *frames]])

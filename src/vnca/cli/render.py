@@ -1,182 +1,27 @@
 """`vnca render SEQUENCE --out FILM`."""
 
-import dataclasses
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import inf
-from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import tyro
 
-from vnca.cli.film import Bounds, Film, FilmConfig, Shown, parse_colour, picture
 from vnca.cli.options import parse
-from vnca.cli.progress import made, tracked
-from vnca.cli.sequence import open_sequence, sequence_bounds, volumes
-from vnca.core.errors import OptionError
-from vnca.core.files import existing_file, writable_file
-from vnca.core.typing import FloatArray
-from vnca.io.film import SUFFIXES as FILMS
-from vnca.io.painted import read_colour
-from vnca.io.picture import SUFFIXES as PICTURES
-from vnca.io.picture import write_image
-from vnca.io.provenance import read_provenance
-from vnca.io.sequence import FrameSequence
-from vnca.io.sheet import contact_sheet
+from vnca.cli.watch import Terminal
 from vnca.io.smoke import SmokeFormat
-from vnca.io.smoke_format import NO_VELOCITY
-from vnca.rendering.brightness import gamma_for_cell_opacity
-
-TRANSPARENT = (".png", ".exr")
-"""Pictures that can go without a background."""
-CELL_OPACITY = {"painted": 0.95, "unpainted": 0.15}
-"""Opacity of a cell of typical smoke that γ is chosen for where none is given or told."""
+from vnca.recipe import rendering
 
 
-@dataclass(frozen=True)
-class Render:
+@dataclass(frozen=True, kw_only=True)
+class Render(rendering.RenderRun):
     """Make a film or a turntable of a sequence, painted or not, or a picture of each frame."""
 
     sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SEQUENCE")]
     """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
-    out: Path
-    """A film (mp4, gif, webp), or a picture (png, exr); with #### in its name, one a frame."""
-    frames: str | None = None
-    """Frames to show, such as 30-53 or 1,4,7-9; all unless given."""
-    colour_grid: str = "Cd"
-    """Grid of linear colours; smoke without it is white."""
-    gamma: float | None = None
-    """Extinction of density 1, per cell: of what the rule took for 1, per cell of the smoke, as in
-    `vnca stylize`, where a file tells of its painting. Unless given, painted frames are as opaque
-    as they were painted for; for others it is chosen from the first."""
-    turntable: int = 0
-    """Hold each frame for so many pictures while the camera goes once around the smoke."""
-    strip: int = 0
-    """Put so many frames, evenly spaced, side by side into one picture."""
-    transparent: bool = False
-    """Leave the background out of pictures (png, exr)."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
-    film: FilmConfig = field(default_factory=FilmConfig)
-    """The camera."""
-
-    def __post_init__(self) -> None:
-        if not (self.is_film or self.out.suffix.lower() in PICTURES):
-            raise OptionError(
-                f"--out {self.out}: expected a film ({', '.join(FILMS)}) or a picture "
-                f"({', '.join(PICTURES)})"
-            )
-        if self.gamma is not None and not 0 < self.gamma < inf:
-            raise OptionError(f"--gamma {self.gamma}: must be positive")
-        if self.turntable < 0:
-            raise OptionError(f"--turntable {self.turntable}: must not be negative")
-        if self.transparent and self.out.suffix.lower() not in TRANSPARENT:
-            raise OptionError(
-                f"--transparent: {self.out} has no transparency; write {' or '.join(TRANSPARENT)}"
-            )
-        if self.strip < 0 or (self.strip and self.is_film):
-            raise OptionError(f"--strip {self.strip}: a number of frames, with a picture as --out")
-        if self.turntable and not self.is_film:
-            raise OptionError("--turntable: needs a film (mp4, gif, webp) as --out")
-
-    @property
-    def is_film(self) -> bool:
-        """Whether the output is a film rather than pictures."""
-        return self.out.suffix.lower() in FILMS
 
 
 def run(arguments: Sequence[str]) -> None:
     """Read the options and render."""
-    render_sequence(parse("render", Render, arguments))
-
-
-def render_sequence(options: Render) -> None:
-    """Render as asked.
-
-    Raises:
-        VncaError: If an input cannot be used or the output cannot be written.
-    """
-    sequence = open_sequence(options.sequence, options.frames)
-    writable_file(options.out)
-    if options.strip:
-        write_image(options.out, contact_sheet([strip(sequence, options, options.strip)]))
-        made("rendered", options.out)
-        return
-    if not options.is_film and len(sequence) > 1 and "#" not in options.out.name:
-        raise OptionError(
-            f"--out {options.out}: {len(sequence)} frames need a film (mp4, gif, webp), "
-            "a name such as frame_####.png, or --frames"
-        )
-    options = _as_painted(options, sequence)
-    bounds = sequence_bounds(sequence, options.smoke)
-    shown = tracked(_frames(sequence, options), "rendering", len(sequence), "frames")
-    if options.is_film:
-        _film(shown, len(sequence), bounds, options)
-    else:
-        _pictures(shown, bounds, options)
-    made("rendered", options.out)
-
-
-def strip(sequence: FrameSequence, options: Render, count: int) -> list[FloatArray]:
-    """Pictures, linear RGB `[rows, columns, 3]`, of `count` frames evenly spaced in a sequence."""
-    picked = sorted({round(at) for at in np.linspace(0, len(sequence) - 1, count)})
-    some = FrameSequence(tuple(sequence[at] for at in picked))
-    options = _as_painted(options, sequence)
-    bounds = sequence_bounds(sequence, options.smoke)
-    return [_picture(frame, bounds, options) for frame in _frames(some, options)]
-
-
-def _as_painted(options: Render, sequence: FrameSequence) -> Render:
-    """With the axis that points up as the files tell it, unless it is given."""
-    told = read_provenance(existing_file(sequence[0].path))
-    if told is None or options.smoke.up_axis is not None:
-        return options
-    return dataclasses.replace(
-        options, smoke=dataclasses.replace(options.smoke, up_axis=told.up_axis)
-    )
-
-
-def _frames(sequence: FrameSequence, options: Render) -> Iterator[Shown]:
-    chosen: float | None = None  # one for all frames that do not tell, or brightness flickers
-    # Nothing here needs velocity, and beside a refined painting it has coarser cells.
-    seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
-    for frame, smoke in zip(sequence, volumes(sequence, seen), strict=True):
-        colour = read_colour(frame.path, seen, grid=options.colour_grid, box=smoke.box)
-        told = read_provenance(frame.path)
-        if told is None and chosen is None and smoke.density.any():
-            opacity = CELL_OPACITY["unpainted" if colour is None else "painted"]
-            gamma = options.gamma or gamma_for_cell_opacity(smoke.density, opacity)
-            chosen = gamma / smoke.cell_length
-        if colour is None:
-            colour = np.ones((*smoke.density.shape, 3), dtype=np.float32)
-        extinction = told.seen_with(options.gamma) if told else chosen or 1.0
-        yield Shown(smoke, colour, extinction)
-
-
-def _film(shown: Iterator[Shown], frames: int, bounds: Bounds, options: Render) -> None:
-    repeats = options.turntable or 1
-    config = dataclasses.replace(options.film, turn=360.0) if options.turntable else options.film
-    with Film(options.out, config, bounds, frames=frames * repeats) as film:
-        for frame in shown:
-            for _ in range(repeats):
-                film.add(frame)
-
-
-def _pictures(shown: Iterator[Shown], bounds: Bounds, options: Render) -> None:
-    for frame in shown:
-        write_image(_numbered(options.out, frame.smoke.frame), _picture(frame, bounds, options))
-
-
-def _picture(frame: Shown, bounds: Bounds, options: Render) -> FloatArray:
-    view = picture(frame, options.film, bounds=bounds, turned=0.0)
-    image = view.rgba if options.transparent else view.over(parse_colour(options.film.background))
-    return image.cpu().numpy()
-
-
-def _numbered(path: Path, frame: int) -> Path:
-    """The path with its #### replaced by a frame number of as many digits, and its minus."""
-    sign = "-" if frame < 0 else ""
-    number = abs(frame)
-    return path.with_name(re.sub("#+", lambda run: f"{sign}{number:0{len(run[0])}d}", path.name))
+    rendering.run(parse("render", Render, arguments), Terminal())

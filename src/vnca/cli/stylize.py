@@ -1,269 +1,48 @@
 """`vnca stylize MODEL SEQUENCE --out DIR`."""
 
-import dataclasses
-import hashlib
-import json
 from collections.abc import Sequence
-from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
-from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 
-import vnca
-from vnca.cli.film import Film, FilmConfig, Shown
-from vnca.cli.options import parse, say
-from vnca.cli.progress import Progress, made
-from vnca.cli.recorded import recorded_smoke
-from vnca.cli.sequence import (
-    open_sequence,
-    placed,
-    region_bounds,
-    require_dense_enough,
-    sequence_region,
-)
+from vnca.cli.options import parse
 from vnca.cli.termination import finishing
-from vnca.core.errors import BackendUnavailableError, OptionError
-from vnca.core.files import remove_leftovers, writable_file, writable_folder
-from vnca.core.volume import refined_transform
-from vnca.engine.backend import choose
-from vnca.engine.session import Compute
-from vnca.io.film import SUFFIXES as FILMS
-from vnca.io.painted import read_colour
-from vnca.io.provenance import read_provenance
-from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
-from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
+from vnca.cli.watch import Terminal
+from vnca.io.smoke import SmokeFormat
 from vnca.painting.config import StylizeConfig
-from vnca.painting.painter import OnError, Painter
-from vnca.painting.roll import Roll
-from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule
+from vnca.recipe import painting
+from vnca.recipe.recorded import recorded_smoke
+from vnca.rule.model import Model
 
 
-@dataclass(frozen=True)
-class Stylize:
+@dataclass(frozen=True, kw_only=True)
+class Stylize(painting.StylizeRun):
     """Paint a smoke sequence with a trained rule."""
 
     model: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="MODEL")]
     """A model file, or the folder of a training run."""
     sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SEQUENCE")]
     """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
-    out: Path
-    """Folder for the painted frames, which keep their names."""
-    frames: str | None = None
-    """Frames to paint, such as 30-53 or 1,4,7-9; all unless given."""
-    colour_grid: tuple[str, ...] = ("Cd",)
-    """Names under which the colour is written: Cd, `color` as Blender names it, or several."""
-    preview: Path | None = None
-    """Film of the painting: mp4, gif or webp."""
-    refine: Literal[1, 2, 3, 4] = 1
-    """Paint on a grid so many times as fine as that of the smoke."""
-    gamma: float | None = None
-    """Extinction of density 1, per cell of the smoke, with which the painting is to be seen:
-    brightness without training again. The files record it."""
-    density_scale: float | None = None
-    """Density that counts as 1; that of the training frame unless given."""
-    backend: str = "auto"
-    """What computes the automaton."""
-    precision: str = "float32"
-    """What the native kernel rounds the factors of its products to; bfloat16 is quicker where the
-    processor has it."""
-    resume: bool = False
-    """Go on with a painting that was ended before its last frame, to the very same files."""
-    on_error: OnError = "stop"
-    """With a frame that cannot be read: stop, skip it, or hold the smoke of the one before."""
     smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: Annotated[StylizeConfig, tyro.conf.arg(name="")] = field(default_factory=StylizeConfig)
     """How the rule is applied."""
-    film: FilmConfig = field(default_factory=FilmConfig)
-    """How the preview is filmed."""
-
-    def __post_init__(self) -> None:
-        Compute(self.backend, precision=self.precision)
-        for name in ("gamma", "density_scale"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < inf:
-                raise OptionError(f"--{name.replace('_', '-')} {value}: must be positive")
-        if self.preview is not None and self.preview.suffix.lower() not in FILMS:
-            raise OptionError(f"--preview {self.preview}: expected a film ({', '.join(FILMS)})")
-        if not self.colour_grid:
-            raise OptionError("--colour-grid: at least one name is needed")
-        names = (self.smoke.density_grid, *self.colour_grid)
-        if len(set(names)) < len(names):
-            raise OptionError(
-                f"--colour-grid {' '.join(self.colour_grid)}: each needs a name of its own, not "
-                f"that of another or of the density ({self.smoke.density_grid})"
-            )
 
 
 def run(arguments: Sequence[str]) -> None:
-    """Read the options and paint; smoke is read as for training unless options say otherwise."""
+    """Read the options and paint; smoke is read as for training unless options say otherwise.
+
+    SIGTERM ends it once a frame is finished.
+    """
     options = parse("stylize", Stylize, arguments)
     model = Model.load(options.model)
     smoke = recorded_smoke(options.model, model)
     if smoke is not None:
         missing: Any = tyro.MISSING
-        defaults = Stylize(missing, missing, missing, smoke=smoke)
+        defaults = Stylize(model=missing, sequence=missing, out=missing, smoke=smoke)
         options = parse("stylize", Stylize, arguments, default=defaults)
-    paint(options, model)
-
-
-def paint(options: Stylize, model: Model | None = None) -> None:
-    """Paint as asked, streaming: memory does not grow with the length of the sequence.
-
-    Args:
-        options: What to paint, and how.
-        model: The model of the options, if it is loaded already.
-
-    Raises:
-        VncaError: If an input cannot be used or the output cannot be written.
-    """
-    model = model or Model.load(options.model)
-    rule = model.rule
-    scales = dataclasses.replace(
-        rule.scales,
-        density=options.density_scale or rule.scales.density,
-        gamma=options.gamma or rule.scales.gamma,
-    )
-    rule = dataclasses.replace(rule, scales=scales)
-    sequence = open_sequence(options.sequence, options.frames)
-    writable_folder(options.out)
-    if options.preview:
-        writable_file(options.preview)
-        remove_leftovers(options.preview.parent, [options.preview.name])
-    if any(f.path.resolve().parent == options.out.resolve() for f in sequence):
-        raise OptionError(f"--out {options.out}: is the folder of the input; choose another")
-    smoke = with_fitted_scale(options.smoke, sequence)
-    region = sequence_region(sequence, smoke, without_broken=options.on_error != "stop")
-    require_dense_enough(sequence, smoke, scales.density)
-    rule = placed(rule, region)
-    compute = Compute(options.backend, precision=options.precision)
-    backend = choose(compute).name
-    roll = Roll(rule, options.config, region.box, compute).refined(options.refine)
-    facts = _facts(options, model, roll)
-    painter = Painter(
-        sequence,
-        options.out,
-        roll,
-        region.lattice,
-        smoke,
-        options.colour_grid,
-        options.on_error,
-        conditions={
-            "the version of vnca": vnca.__version__,
-            "--refine": options.refine,
-            "the model": _digest(rule),
-            "the list of frames": [frame.path.name for frame in sequence],
-            "the place of its cells in the world": region.lattice.to_world.tolist(),
-            "the box of the smoke": region.box,
-            "--backend": backend,
-            "--precision": options.precision,
-            "--density-scale": scales.density,
-            "--gamma": scales.gamma,
-            "the name of the model": facts["model"],
-            "--colour-grid": options.colour_grid,
-            **{
-                f"--{name.replace('_', '-')}": value
-                for values in (options.config, smoke)
-                for name, value in dataclasses.asdict(values).items()
-            },
-            "--steps-per-frame": roll.steps_per_frame,
-            "--domain": roll.domain_kind,
-        },
-        tell=say,
-        refine=options.refine,
-        facts=facts,
-    )
-    is_filmed = _paint(painter, options)
-    made("painted", options.out)
-    if is_filmed and options.preview:
-        made("film", options.preview)
-
-
-def _digest(rule: Rule) -> str:
-    """Equal for rules that paint equally."""
-    shape = dataclasses.asdict(rule.config)
-    place = rule.place and [rule.place.lattice.to_world.tolist(), rule.place.box]
-    described = json.dumps([shape, rule.scales.velocity, place])
-    digest = hashlib.blake2b(described.encode(), digest_size=16)
-    for weights in (rule.hidden, rule.bias, rule.output):
-        digest.update(weights.tobytes())
-    return digest.hexdigest()
-
-
-def _paint(painter: Painter, options: Stylize) -> bool:
-    """Paint to the end, to Ctrl-C or, once a frame is finished, to SIGTERM.
-
-    Returns:
-        Whether it was filmed.
-    """
-    sequence, finished = painter.sequence, 0
-    with ExitStack() as stack:
-        film = _film(options, painter, stack)
-        unfinished = painter.begin(resume=options.resume)
-        already = len(unfinished.sources)
-        try:
-            with (
-                Progress("painting", len(sequence), "frames", already=already) as progress,
-                finishing() as stop_if_asked,
-                closing(painter.paint(unfinished)) as paths,
-            ):
-                for finished, (frame, path) in enumerate(zip(sequence, paths, strict=True), 1):
-                    if film is not None and path is not None:
-                        film.add(_read_painted(path, frame.path, options))
-                    progress.show(finished)
-                    stop_if_asked()
-        except KeyboardInterrupt:
-            done = max(already, finished)
-            say(f"stopped after {done} of {len(sequence)} frames; --resume goes on")
-            raise
-    painter.discard()
-    return film is not None
-
-
-def _film(options: Stylize, painter: Painter, stack: ExitStack) -> Film | None:
-    """The film of a preview, if one is wanted and what it takes is installed."""
-    if options.preview is None:
-        return None
-    cells = refined_transform(painter.lattice.to_world, options.refine)
-    bounds = region_bounds(painter.roll.box, cells)
-    try:
-        film = Film(options.preview, options.film, bounds, frames=len(painter.sequence))
-        return stack.enter_context(film)
-    except BackendUnavailableError as error:
-        later = f"vnca render {options.out} --out {options.preview}"
-        say(f"{error}; painting without a preview, which {later} makes later")
-        return None
-
-
-def _read_painted(path: Path, source: Path, options: Stylize) -> Shown:
-    """A painted frame as its file has it: the film is the same with --resume, and by `render`."""
-    up = up_axis_of(source, options.smoke)
-    format = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY, up_axis=up)
-    smoke, told = read_smoke(path, format), read_provenance(path)
-    colour = read_colour(path, format, grid=options.colour_grid[0], box=smoke.box)
-    assert told is not None, "it was written a moment ago"
-    assert colour is not None, "it was written a moment ago"
-    return Shown(smoke, colour, told.extinction)
-
-
-def _facts(options: Stylize, model: Model, roll: Roll) -> dict[str, str | int | float]:
-    """What painted files tell of the rule and the options, beside what they are painted from."""
-    path = options.model.resolve()
-    name = path.parent.name if path.name == MODEL_NAME else path.stem
-    config = options.config
-    return {
-        "version": vnca.__version__,
-        "model": name,
-        "style": str(model.training.get("style", "")),
-        "refine": options.refine,
-        "strength": config.strength,
-        "density_strength": config.density_strength,
-        "steps_per_frame": roll.steps_per_frame,
-        "warmup": config.warmup,
-        "domain": roll.domain_kind,
-        "seed": config.seed,
-    }
+    with finishing() as stop_if_asked:
+        for _ in painting.run(options, Terminal(stop_if_asked), model):
+            pass

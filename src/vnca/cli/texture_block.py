@@ -10,12 +10,9 @@ from vnca.cli.progress import Progress
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
 from vnca.engine.session import Compute
-from vnca.painting.block import LARGEST, SMALLEST, grow
+from vnca.painting.block import KIND, LARGEST, SMALLEST, grow
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule
-
-KIND = "texture"
-"""What the model of a solid texture says it is, under `kind` in its record of training."""
 
 
 @dataclass(frozen=True)

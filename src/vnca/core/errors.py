@@ -71,3 +71,7 @@ class OutOfMemoryError(VncaError):
 
 class Terminated(KeyboardInterrupt):
     """SIGTERM: the user, or who looks after the machine, wants an end as with Ctrl-C."""
+
+
+class Cancelled(KeyboardInterrupt):
+    """A `Watch` wants an end as with Ctrl-C: what is finished is kept, and work can go on later."""

@@ -41,7 +41,7 @@ class FilmWriter:
         OutputError: If the file cannot be written, or no frame was added.
     """
 
-    def __init__(self, path: Path, fps: float) -> None:
+    def __init__(self, path: str | Path, fps: float) -> None:
         self.path = Path(path)
         suffix = self.path.suffix.lower()
         if suffix not in _ENCODERS:

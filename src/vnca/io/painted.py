@@ -30,8 +30,8 @@ _HALF_MOST = float(np.finfo(np.float16).max)
 
 
 def write_painted(
-    path: Path,
-    source: Path,
+    path: str | Path,
+    source: str | Path,
     format: SmokeFormat,
     *,
     density: FloatArray | Field,
@@ -72,6 +72,7 @@ def write_painted(
         FileFormatError: If the source cannot be read.
         GridError: If the source has grids, but no density grid, or one that cannot be copied.
     """
+    path, source = Path(path), Path(source)
     if density.shape != box.shape or colour.shape != (*box.shape, 3):
         raise ShapeError(
             f"painted density {density.shape} and colour {colour.shape} do not fit {box}"
@@ -89,7 +90,7 @@ def write_painted(
     write(path, source, format, frame, colour_grids, provenance.metadata if provenance else {})
 
 
-def write_smoke(path: Path, volume: Volume) -> None:
+def write_smoke(path: str | Path, volume: Volume) -> None:
     """Write density and velocity of a volume as a VDB file that default options read back.
 
     The file has +z up, and both grids only where there is density; velocity is in cells per
@@ -98,6 +99,7 @@ def write_smoke(path: Path, volume: Volume) -> None:
     Raises:
         OutputError: If the path cannot be written, or has another suffix than `.vdb`.
     """
+    path = Path(path)
     _require_vdb(path)
     transform = Transform.from_matrix(volume.index_to_world)
     density, velocity = volume.density_field, volume.velocity_field
@@ -226,8 +228,8 @@ class _Painting:
 
 
 def _paint_vdb(
-    path: Path,
-    source: Path,
+    path: str | Path,
+    source: str | Path,
     format: SmokeFormat,
     frame: _Painting,
     colour_grids: Sequence[str],
@@ -275,8 +277,8 @@ def _paint_vdb(
 
 
 def _paint_npz(
-    path: Path,
-    source: Path,
+    path: str | Path,
+    source: str | Path,
     format: SmokeFormat,
     frame: _Painting,
     colour_grids: Sequence[str],

@@ -59,7 +59,7 @@ _GLARING = 2.0
 _SMALLEST_STYLE = 8
 
 
-def read_image(path: Path) -> FloatArray:
+def read_image(path: str | Path) -> FloatArray:
     """Read a picture upright, as linear RGB; its content decides the format, not its name.
 
     PNG, JPEG, WebP, AVIF, TIFF, GIF, BMP, PPM, JPEG 2000, TGA, OpenEXR and Radiance HDR. Colour
@@ -76,29 +76,49 @@ def read_image(path: Path) -> FloatArray:
             than Pillow's limit against decompression bombs (89 million pixels).
         BackendUnavailableError: If the package that the format needs is not installed.
     """
-    return _over_white(*_read(path))
+    return _over_white(*_read(Path(path)))
 
 
-def read_style(path: Path) -> FloatArray:
+def read_style(path: str | Path) -> FloatArray:
     """Read a picture to learn from: like `read_image`, and there is something in it to learn.
 
     Raises:
         FileFormatError: If it is transparent, a single colour or tiny; and as `read_image` says.
         BackendUnavailableError: If the package that the format needs is not installed.
     """
-    colour, alpha = _read(path)
-    rows, columns = colour.shape[:2]
-    if min(rows, columns) < _SMALLEST_STYLE:
-        raise FileFormatError(
-            f"{path}: the picture has {columns}×{rows} pixels; to learn from it, "
-            f"{_SMALLEST_STYLE}×{_SMALLEST_STYLE} are the least"
-        )
+    colour, alpha = _read(Path(path))
     if alpha is not None and not alpha.any():
         raise FileFormatError(f"{path}: the picture is fully transparent; nothing can be learned")
-    shown = _over_white(colour, alpha)
+    return _with_something_to_learn(_over_white(colour, alpha), str(path))
+
+
+def style_array(image: ArrayLike) -> FloatArray:
+    """An array as a picture to learn from: `[r, c, 3]`, linear RGB from 0 to 1, in float32.
+
+    Raises:
+        FileFormatError: If it is none, a single colour or tiny.
+    """
+    try:
+        picture = np.asarray(image, np.float32)
+    except (TypeError, ValueError) as error:
+        raise FileFormatError(f"`style`: not an array of numbers ({error})") from error
+    if picture.ndim != 3 or picture.shape[2] != 3:
+        raise FileFormatError(f"`style`: expected an array [r, c, 3], got {list(picture.shape)}")
+    if not (picture.size and picture.min() >= 0 and picture.max() <= 1):  # NaN is neither
+        raise FileFormatError("`style`: expected linear RGB from 0 to 1; divide bytes by 255 first")
+    return _with_something_to_learn(picture, "`style`")
+
+
+def _with_something_to_learn(shown: FloatArray, what: str) -> FloatArray:
+    rows, columns = shown.shape[:2]
+    if min(rows, columns) < _SMALLEST_STYLE:
+        raise FileFormatError(
+            f"{what}: the picture has {columns}×{rows} pixels; to learn from it, "
+            f"{_SMALLEST_STYLE}×{_SMALLEST_STYLE} are the least"
+        )
     least, greatest = (linear_to_srgb(end) for end in (shown.min((0, 1)), shown.max((0, 1))))
     if (greatest - least).max() < 1.5 / 255:
-        raise FileFormatError(f"{path}: the picture is a single colour; nothing can be learned")
+        raise FileFormatError(f"{what}: the picture is a single colour; nothing can be learned")
     return shown
 
 
@@ -108,7 +128,7 @@ def kind_of(data: bytes) -> str:
                 "something else")  # fmt: skip
 
 
-def write_image(path: Path, image: AnyArray) -> None:
+def write_image(path: str | Path, image: AnyArray) -> None:
     """Write a picture as PNG, JPEG, WebP (8-bit sRGB) or OpenEXR (linear, half floats).
 
     PNG and WebP store straight alpha, OpenEXR premultiplied; JPEG, which has none, shows the

@@ -60,6 +60,7 @@ class Reader:
     where_velocity_is: Callable[[Path], str]
 
 
+_ANY = SmokeFormat()
 READERS = {
     ".vdb": Reader(read_vdb_smoke, vdb_smoke_extent, where_vdb_velocity_is),
     ".npz": Reader(read_npz_smoke, npz_smoke_extent, where_npz_velocity_is),
@@ -67,7 +68,7 @@ READERS = {
 
 
 def read_smoke(
-    path: Path, format: SmokeFormat, *, frame: int = 0, lattice: Lattice | None = None
+    path: str | Path, format: SmokeFormat = _ANY, *, frame: int = 0, lattice: Lattice | None = None
 ) -> Volume:
     """A frame over the box of its smoke, up along +z, velocity in cells per frame.
 
@@ -87,6 +88,7 @@ def read_smoke(
             if they can have no place on the lattice.
         OptionError: If an option has no meaning.
     """
+    path = Path(path)
     stored = _reader(path).read(path, format)
     density = _non_negative(stored.density, path)
     velocity = None if stored.velocity is None else _velocity(stored.velocity, stored, format)
@@ -112,13 +114,16 @@ def smoke_extent(path: Path, format: SmokeFormat) -> Extent:
     return Extent(place.box(extent.box), index_to_world)
 
 
-def smoke_box(path: Path, format: SmokeFormat, *, lattice: Lattice | None = None) -> Box:
+def smoke_box(
+    path: str | Path, format: SmokeFormat = _ANY, *, lattice: Lattice | None = None
+) -> Box:
     """The box that `read_smoke` would fill; quick where the file's headers tell.
 
     Raises:
         FileFormatError: If the file cannot be read.
         GridError: If there is no density grid, or it can have no place on the lattice.
     """
+    path = Path(path)
     box, index_to_world = smoke_extent(path, format)
     if lattice is None or box.is_empty:
         return box

@@ -14,6 +14,8 @@ from vnca.rule.rule import PRIORS, Rule
 
 SMALLEST, LARGEST = 8, 384
 """Cells along an edge."""
+KIND = "texture"
+"""What the model of a solid texture says it is, under `kind` in its record of training."""
 
 
 def block_domain(size: int) -> Domain:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
@@ -24,6 +25,8 @@ FORMAT_VERSION = 2
 """The newest that is read; a model is written in the oldest that holds it, 2 with a decoder."""
 MODEL_NAME = "model.safetensors"
 """Name of the model in a run folder."""
+CONFIG_NAME = "config.json"
+"""Name, in a run folder, of what was asked for."""
 
 _METADATA = "vnca"
 _WEIGHTS = ("hidden", "bias", "output")
@@ -44,14 +47,17 @@ class Model:
         training: How it came about: style, features, preset, iterations, seed, …; JSON values.
         style: sRGB thumbnail `[r, c, 3]` of the style picture, uint8, or None.
         version: The `vnca` that wrote the file.
+        inputs: What it was trained on, where that is known: under `frame` a path or a `Volume`,
+            under `style` a path or an array `[r, c, 3]` of linear RGB. It is not in the file.
     """
 
     rule: Rule
     training: dict[str, Any] = field(default_factory=dict)
     style: NDArray[np.uint8] | None = None
     version: str = vnca.__version__
+    inputs: Mapping[str, Any] = field(default_factory=dict)
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | Path) -> None:
         """Write the model file, whole or not at all.
 
         Raises:
@@ -78,12 +84,12 @@ class Model:
                 }
             )
         }
-        with whole_file(path) as temporary:
+        with whole_file(Path(path)) as temporary:
             # Not by safetensors itself, which has an error of its own for a full disk.
             temporary.write_bytes(save(tensors, metadata=metadata))
 
     @classmethod
-    def load(cls, path: Path) -> "Model":
+    def load(cls, path: str | Path) -> "Model":
         """Read a model file, or the model in a run folder.
 
         Raises:

@@ -14,13 +14,12 @@ from vnca.core.errors import OutputError
 from vnca.core.files import remove_file, remove_leftovers, whole_file, writable_folder
 from vnca.core.typing import FloatArray
 from vnca.io.picture import write_image
-from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.model import CONFIG_NAME, MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, Thrift
 from vnca.training.config import TrainingConfig
 from vnca.training.curves import PATTERN, Curves
 from vnca.training.loop import Progress
 
-CONFIG_NAME = "config.json"
 _PREVIEW = "preview_{:06d}.png"
 _OF_ONE_RUN = (PATTERN, "preview_[0-9]*.png")
 
@@ -42,6 +41,7 @@ class RunFolder:
             OutputError: If it cannot be written, or holds a run already and neither is asked for.
         """
         self.path = writable_folder(path)
+        self.checkpoint_path = path / CHECKPOINT_NAME
         self._overwrite, self._resumed_from = overwrite, resumed_from
         self._thrift = Thrift()
         if overwrite or resumed_from is not None:
@@ -143,3 +143,26 @@ class RunFolder:
     def finish(self) -> None:
         """Remove the checkpoint: the training has come to its end."""
         remove_file(self.path / CHECKPOINT_NAME)
+
+
+class NoFolder:
+    """In the place of a run folder where nothing is to be written."""
+
+    path = None
+    checkpoint_path = Path(CHECKPOINT_NAME)
+    is_keeping_due = False
+
+    def __enter__(self) -> "NoFolder":
+        """Nothing to make."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing to end."""
+
+    def _ignore(self, *_: object) -> None:
+        pass
+
+    reserve = start = log = preview = save = keep = _ignore
+
+    def finish(self) -> None:
+        """Nothing to remove."""

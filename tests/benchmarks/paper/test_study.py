@@ -6,8 +6,8 @@ import pytest
 import study
 from study import REFERENCE, Findings, Study, table
 
-from vnca.cli.train import Train
 from vnca.core.errors import FileFormatError, OptionError
+from vnca.recipe.smoke import SmokeRun
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule, Scales
 from vnca.training.checkpoint import CHECKPOINT_NAME
@@ -29,11 +29,11 @@ def make(tmp_path: Path) -> Make:
 
 
 @pytest.fixture
-def trainings(monkeypatch: pytest.MonkeyPatch) -> list[Train]:
+def trainings(monkeypatch: pytest.MonkeyPatch) -> list[SmokeRun]:
     """Those that were asked for; each leaves a rule that was not trained."""
-    asked: list[Train] = []
+    asked: list[SmokeRun] = []
 
-    def train(options: Train) -> None:
+    def train(options: SmokeRun, _: object) -> None:
         asked.append(options)
         options.out.mkdir(parents=True, exist_ok=True)
         config = options.config
@@ -44,7 +44,7 @@ def trainings(monkeypatch: pytest.MonkeyPatch) -> list[Train]:
     return asked
 
 
-def test_studies_share_the_reference(make: Make, trainings: list[Train]) -> None:
+def test_studies_share_the_reference(make: Make, trainings: list[SmokeRun]) -> None:
     first, second = make(), make()
     first.trained("with_density", first.config, 0)
     second.trained("random_views", second.config, 0)
@@ -52,7 +52,7 @@ def test_studies_share_the_reference(make: Make, trainings: list[Train]) -> None
 
 
 def test_a_copy_of_the_inputs_is_not_trained_on_again(
-    make: Make, trainings: list[Train], tmp_path: Path
+    make: Make, trainings: list[SmokeRun], tmp_path: Path
 ) -> None:
     one = make()
     other = make(frame=tmp_path / "copy.vdb")
@@ -64,7 +64,7 @@ def test_a_copy_of_the_inputs_is_not_trained_on_again(
 
 @pytest.mark.parametrize("changed", ["frame", "style", "iterations", "size", "smoke", "seed"])
 def test_a_run_of_something_else_is_not_taken_for_this_one(
-    make: Make, trainings: list[Train], changed: str
+    make: Make, trainings: list[SmokeRun], changed: str
 ) -> None:
     one = make()
     one.trained(REFERENCE, one.config, 0)
@@ -81,7 +81,9 @@ def test_a_run_of_something_else_is_not_taken_for_this_one(
     assert len({options.out for options in trainings}) == 2
 
 
-def test_a_training_that_was_interrupted_is_done_again(make: Make, trainings: list[Train]) -> None:
+def test_a_training_that_was_interrupted_is_done_again(
+    make: Make, trainings: list[SmokeRun]
+) -> None:
     one = make()
     one.trained(REFERENCE, one.config, 0)
     (trainings[0].out / CHECKPOINT_NAME).touch()
@@ -89,7 +91,7 @@ def test_a_training_that_was_interrupted_is_done_again(make: Make, trainings: li
     assert len(trainings) == 2
 
 
-def test_a_rule_is_trained_for_each_seed(make: Make, trainings: list[Train]) -> None:
+def test_a_rule_is_trained_for_each_seed(make: Make, trainings: list[SmokeRun]) -> None:
     one = make(seeds=(3, 5))
     rules = dict(one.rules(REFERENCE, one.config))
     assert [*rules] == [options.config.seed for options in trainings] == [3, 5]
@@ -106,7 +108,7 @@ def test_a_study_without_seeds_is_refused() -> None:
         Study(seeds=())
 
 
-def test_a_missing_frame_is_named(make: Make, trainings: list[Train]) -> None:
+def test_a_missing_frame_is_named(make: Make, trainings: list[SmokeRun]) -> None:
     one = make(frame=Path("nowhere.vdb"))
     with pytest.raises(FileFormatError, match=r"nowhere\.vdb"):
         one.trained(REFERENCE, one.config, 0)

@@ -1,18 +1,16 @@
-"""A training on the command line, whatever it is trained on: its course, and going on with it."""
+"""A training in the folder of its run, whatever it is trained on: begun, interrupted, resumed."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from traceback import clear_frames
 from typing import Any, TypeVar
 
 import torch
 
-from vnca.cli.options import say
-from vnca.cli.progress import Progress, made
-from vnca.cli.recorded import PICTURE_CELLS, recorded, restored
 from vnca.core.errors import (
     DivergenceError,
     FileFormatError,
@@ -21,15 +19,17 @@ from vnca.core.errors import (
     VncaError,
 )
 from vnca.core.typing import FloatArray
+from vnca.core.watch import Watch
 from vnca.features.network import FeatureNetwork
 from vnca.io.picture import resize, to_srgb8
+from vnca.recipe.recorded import PICTURE_CELLS, recorded, restored
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.config import TrainingConfig
 from vnca.training.loop import Trainer
 from vnca.training.memory import is_out_of_memory, memory_advice, memory_budget
 from vnca.training.preview import preview_sheet
-from vnca.training.run import RunFolder
+from vnca.training.run import NoFolder, RunFolder
 
 FINGERPRINTS = "fingerprints"
 """What says in the configuration of a run what its inputs were, wherever their files lie."""
@@ -41,7 +41,7 @@ THUMBNAIL = 96
 class TrainingOptions:
     """What is asked of a training, whatever it is trained on."""
 
-    out: Path
+    out: Path | None
     """Folder of the run: model, configuration, previews and loss curves."""
     overwrite: bool = False
     """Replace the model of an earlier run in the same folder."""
@@ -55,7 +55,7 @@ class TrainingOptions:
 
     def __post_init__(self) -> None:
         if self.preview_every < 1:
-            raise OptionError(f"--preview-every {self.preview_every}: at least 1 is needed")
+            raise OptionError(f"`preview_every` {self.preview_every}: at least 1 is needed")
         memory_budget(self.memory_budget)
 
 
@@ -77,32 +77,34 @@ T = TypeVar("T", bound=TrainingOptions)
 
 @dataclass(frozen=True)
 class Session:
-    """A trainer, and what it leaves in the folder of its run.
+    """A trainer, and what it leaves in the folder of its run, if it has one.
 
     Attributes:
-        command: What is called to begin or to go on, without `vnca`.
+        command: The command that begins it or goes on with it, without `vnca`.
         trainer: What is trained.
-        folder: Where it leaves what it leaves.
+        folder: Where models, previews and checkpoints go.
         style: The picture, linear RGB `[r, c, 3]`.
         training: What the model file tells of where it comes from.
         inputs: What `fingerprints` gave.
         asked: What was asked for, as JSON values.
         preview_every: Iterations between preview pictures.
+        watch: Is told how far it has come.
     """
 
     command: str
     trainer: Trainer
-    folder: RunFolder
+    folder: RunFolder | NoFolder
     style: FloatArray
     training: dict[str, Any]
     inputs: Mapping[str, str]
     asked: Mapping[str, Any]
     preview_every: int
+    watch: Watch
 
-    def run(self, checkpoint: Checkpoint | None, *notes: str) -> None:
+    def run(self, checkpoint: Checkpoint | None, *notes: str) -> Model:
         """Train from the beginning or from a checkpoint on, to the end or to Ctrl-C.
 
-        Whichever it is, the folder holds a usable model. `notes` are told first.
+        Either way the folder holds a usable model. `notes` are told first.
 
         Raises:
             VncaError: If the checkpoint does not fit, the folder cannot be written, training
@@ -110,48 +112,50 @@ class Session:
         """
         trainer = self.trainer
         if checkpoint is not None:
-            checkpoint.resume(trainer, self.inputs, self.folder.path / CHECKPOINT_NAME)
+            checkpoint.resume(trainer, self.inputs, self.folder.checkpoint_path)
         with self.folder:
             if checkpoint is None:
                 self._keep()
             inputs = {name: self.asked[name] for name in ("frame", "style") if name in self.asked}
             facts = {**self.training, "inputs": inputs, FINGERPRINTS: self.inputs}
             self.folder.start(trainer.config, facts)
-            say(
+            self.watch.note(
                 f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
                 f"features '{self.training['features']}', {self.training['device']}"
             )
             chosen = "" if trainer.config.appearance.style_scale else ", chosen by its strokes"
-            say(
+            self.watch.note(
                 f"the picture is {trainer.picture_cells:.0f} cells wide{chosen} "
-                f"(--appearance.style-scale {trainer.style_scale:.2f})"
+                f"(`appearance.style_scale` {trainer.style_scale:.2f})"
             )
             for note in notes:
-                say(note)
+                self.watch.note(note)
             self._improve()
+        return self._model()
 
     def _improve(self) -> None:
         trainer, folder, total = self.trainer, self.folder, self.trainer.config.iterations
-        progress = Progress("training", total, "iterations", already=trainer.iteration)
+        progress = partial(self.watch.progress, "training", total=total, unit="iterations")
         try:
-            with progress:
-                for step in trainer.run():
-                    folder.log(step, trainer.learning_rate)
-                    progress.show(step.iteration, f"loss {step.loss:.2f}")
-                    if step.diverged:
-                        say(self._setback())
-                    if step.iteration % self.preview_every == 0 and step.iteration < total:
-                        self._show()
-                    if folder.is_keeping_due:
-                        self._keep()
+            progress(trainer.iteration)
+            for step in trainer.run():
+                folder.log(step, trainer.learning_rate)
+                if step.diverged:
+                    self.watch.note(self._rollback())
+                if step.iteration % self.preview_every == 0 and step.iteration < total:
+                    self._show()
+                if folder.is_keeping_due:
+                    self._keep()
+                progress(step.iteration, note=f"loss {step.loss:.2f}")
         except KeyboardInterrupt:
             trainer.undo()
             self._keep()
             self._show()
-            say(
-                f"stopped at iteration {trainer.iteration}; the model so far is in {folder.path}; "
-                f"to go on: {self._call}"
-            )
+            if folder.path is not None:
+                self.watch.note(
+                    f"stopped at iteration {trainer.iteration}; the model so far is in "
+                    f"{folder.path}; to go on: {self._call}"
+                )
             raise
         except DivergenceError:  # which would come again
             self._save()
@@ -165,34 +169,45 @@ class Session:
             self._keep()
             self._save()
             advice = memory_advice(trainer.scene, trainer.config, trainer.kept_states)
+            going_on = (
+                f"to go on from here when more is free, or with a `memory_budget`: {self._call}"
+                if folder.path is not None
+                else "set a `memory_budget`, or `out` to be able to go on from here"
+            )
             raise OutOfMemoryError(
-                f"out of memory in iteration {trainer.iteration + 1}: {advice}; to go on from here "
-                f"when more is free, or with a --memory-budget: {self._call}"
+                f"out of memory in iteration {trainer.iteration + 1}: {advice}; {going_on}"
             ) from None
         self._show()
         folder.finish()
-        made("model", folder.path)
+        if folder.path is not None:
+            self.watch.made("model", folder.path)
 
     @property
     def _call(self) -> str:
-        return f"vnca {self.command} --resume {self.folder.path}"
+        return f"vnca {self.command} `resume` {self.folder.path}"
 
     def _keep(self) -> None:
         """Write a checkpoint."""
+        if self.folder.path is None:
+            return
         snapshot = self.trainer.snapshot()
         self.folder.keep(Checkpoint(snapshot, self.inputs, self.command, self.asked))
 
     def _show(self) -> None:
         """Write the model and a preview."""
         self._save()
-        self.folder.preview(preview_sheet(self.trainer, self.style), self.trainer.iteration)
+        if self.folder.path is not None:
+            self.folder.preview(preview_sheet(self.trainer, self.style), self.trainer.iteration)
 
     def _save(self) -> None:
         """Write the model."""
-        provenance = {**self.training, "iterations": self.trainer.iteration}
-        self.folder.save(Model(self.trainer.rule(), provenance, _small(self.style)))
+        self.folder.save(self._model())
 
-    def _setback(self) -> str:
+    def _model(self) -> Model:
+        provenance = {**self.training, "iterations": self.trainer.iteration}
+        return Model(self.trainer.rule(), provenance, _small(self.style))
+
+    def _rollback(self) -> str:
         trainer = self.trainer
         return (
             f"training diverged at iteration {trainer.iteration}: back to the weights of iteration "
@@ -200,13 +215,16 @@ class Session:
         )
 
 
-def interrupted(command: str, kind: type[T], options: ResumeOptions) -> tuple[T, Checkpoint] | None:
+def interrupted(
+    command: str, kind: type[T], options: ResumeOptions, watch: Watch
+) -> tuple[T, Checkpoint] | None:
     """What is asked of an interrupted training, and where it was left; None if it has ended.
 
     Args:
         command: The command that goes on, without `vnca`.
         kind: The options it begins with.
         options: What is asked now; it takes the place of what was asked first.
+        watch: Is told if there is nothing left to do.
 
     Raises:
         FileFormatError: If there is no training to go on with, or it is another command's.
@@ -220,13 +238,13 @@ def interrupted(command: str, kind: type[T], options: ResumeOptions) -> tuple[T,
                 f"{folder}: no training to go on with here (no {CHECKPOINT_NAME}); "
                 f"begin one with vnca {command}"
             )
-        say(f"{folder}: this training has come to its end; there is nothing left to do")
+        watch.note(f"{folder}: this training has come to its end; there is nothing left to do")
         return None
     checkpoint = Checkpoint.load(path)
     if checkpoint.command != command:
         raise FileFormatError(
             f"{path}: was written by vnca {checkpoint.command}; go on with "
-            f"vnca {checkpoint.command} --resume {folder}"
+            f"vnca {checkpoint.command} `resume` {folder}"
         )
     try:
         begun = restored(kind, checkpoint.options)
@@ -241,13 +259,17 @@ def interrupted(command: str, kind: type[T], options: ResumeOptions) -> tuple[T,
     return dataclasses.replace(begun, out=folder, **changed), checkpoint
 
 
-def run_folder(path: Path, *, overwrite: bool, checkpoint: Checkpoint | None) -> RunFolder:
-    """The folder of a new training, or of one that goes on.
+def run_folder(
+    path: Path | None, *, overwrite: bool, checkpoint: Checkpoint | None
+) -> RunFolder | NoFolder:
+    """The folder of a new training, or of one that goes on; none where nothing is to be written.
 
     Raises:
         OutputError: If it cannot be written, or holds a run that may not be replaced.
         FileFormatError: If the checkpoint is damaged.
     """
+    if path is None:
+        return NoFolder()
     if checkpoint is None:
         return RunFolder(path, overwrite=overwrite)
     if not checkpoint.training:  # It was interrupted before its first iteration.
@@ -261,14 +283,19 @@ def run_folder(path: Path, *, overwrite: bool, checkpoint: Checkpoint | None) ->
     return RunFolder(path, resumed_from=iteration)
 
 
-def asked(options: Any) -> dict[str, Any]:
-    """The options of a training as JSON, with paths that hold from any folder."""
+def asked(kind: type[TrainingOptions], options: Any) -> dict[str, Any]:
+    """The options of a training as JSON, with paths that hold from any folder.
+
+    Args:
+        kind: What is asked of such a training; a subclass may add to it what need not be known.
+        options: An instance.
+    """
     config: TrainingConfig = options.config
     if Path(config.features).suffix:  # else a name
         config = dataclasses.replace(config, features=str(Path(config.features).absolute()))
-    given = {field.name: getattr(options, field.name) for field in dataclasses.fields(options)}
+    given = {field.name: getattr(options, field.name) for field in dataclasses.fields(kind)}
     paths = {name: value.absolute() for name, value in given.items() if isinstance(value, Path)}
-    return recorded(dataclasses.replace(options, **paths, config=config))
+    return recorded(kind(**{**given, **paths, "config": config}))
 
 
 def shown_and_judged(trainer: Trainer, network: FeatureNetwork) -> dict[str, Any]:
@@ -295,7 +322,7 @@ def fitting(config: TrainingConfig, what: str) -> Iterator[None]:
             raise
         seen = config.pictures
         raise OutOfMemoryError(
-            f"out of memory before training began, with {what} and pictures of --{seen.option} "
+            f"out of memory before training began, with {what} and pictures of `{seen.option}` "
             f"{seen.size} pixels; lower it, or take a smaller {what.split()[-1]}"
         ) from error
 
@@ -312,9 +339,9 @@ def choose_device(name: str) -> torch.device:
         device = torch.device(name)
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as error:
-        raise OptionError(f"--device {name}: not available here; use auto or cpu") from error
+        raise OptionError(f"`device` {name}: not available here; use auto or cpu") from error
     if device.type not in ("cpu", "cuda"):
-        raise OptionError(f"--device {name}: expected auto, cpu or cuda")
+        raise OptionError(f"`device` {name}: expected auto, cpu or cuda")
     return device
 
 

@@ -47,17 +47,17 @@ class FilmConfig:
 
     def __post_init__(self) -> None:
         if self.rows < 16 or self.columns < 16:
-            raise OptionError("--film.rows and --film.columns: at least 16 pixels are needed")
+            raise OptionError("`film.rows` and `film.columns`: at least 16 pixels are needed")
         if not 0 < self.fps <= 1000:
-            raise OptionError(f"--film.fps {self.fps}: must be positive, at most 1000")
+            raise OptionError(f"`film.fps` {self.fps}: must be positive, at most 1000")
         if not 0 <= self.field_of_view < 120:
-            raise OptionError(f"--film.field-of-view {self.field_of_view}: must be 0 to 120")
+            raise OptionError(f"`film.field_of_view` {self.field_of_view}: must be 0 to 120")
         if not -90 <= self.elevation <= 90:
-            raise OptionError(f"--film.elevation {self.elevation}: must be -90 to 90 degrees")
+            raise OptionError(f"`film.elevation` {self.elevation}: must be -90 to 90 degrees")
         if not (isfinite(self.azimuth) and isfinite(self.turn)):
-            raise OptionError("--film.azimuth and --film.turn: expected numbers of degrees")
+            raise OptionError("`film.azimuth` and `film.turn`: expected numbers of degrees")
         if not 0 < self.step <= 4:
-            raise OptionError(f"--film.step {self.step}: must be above 0, at most 4 cells")
+            raise OptionError(f"`film.step` {self.step}: must be above 0, at most 4 cells")
         parse_colour(self.background)
 
 
@@ -200,5 +200,5 @@ def parse_colour(text: str) -> list[float]:
     except ValueError:
         values = b""
     if len(values) != 3:
-        raise OptionError(f"--film.background '{text}': expected a colour such as #101014")
+        raise OptionError(f"`film.background` '{text}': expected a colour such as #101014")
     return srgb_to_linear(np.frombuffer(values, np.uint8) / 255).tolist()

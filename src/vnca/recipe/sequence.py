@@ -1,21 +1,25 @@
+<<<<<<< HEAD:src/vnca/cli/sequence.py
 """A sequence of smoke as the commands see it: frames, gaps, box, volumes read ahead."""
+=======
+"""A sequence of smoke in files: its frames, gaps told, its box, volumes read ahead."""
+>>>>>>> recipe:src/vnca/recipe/sequence.py
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from vnca.cli.options import say
 from vnca.core.camera import world_box
 from vnca.core.errors import SequenceError
 from vnca.core.files import existing_file
 from vnca.core.lattice import Lattice, Placement, Region
 from vnca.core.typing import AnyArray, Box
 from vnca.core.volume import Volume
-from vnca.io.orientation import on_lattice
+from vnca.core.watch import Watch
+from vnca.io.orientation import on_lattice, on_one_lattice
 from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY, Extent
@@ -24,23 +28,37 @@ from vnca.painting.painter import BROKEN
 from vnca.rule.rule import SMOKE_THRESHOLD, Rule, density_scale
 
 
+<<<<<<< HEAD:src/vnca/cli/sequence.py
 def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
     """The frames of a pattern; gaps and sub-frames are mentioned on standard error.
+=======
+def open_sequence(pattern: str | Path, frames: str | None, watch: Watch) -> FrameSequence:
+    """The frames of a pattern; gaps and sub-frames are told to `watch`.
+>>>>>>> recipe:src/vnca/recipe/sequence.py
 
     Raises:
         SequenceError: If there are none.
     """
     sequence = find_frames(pattern, frames)
     if sequence.gaps:
-        say(f"{pattern}: no file for frames {format_frames(sequence.gaps)}; going on without")
+        watch.note(
+            f"{pattern}: no file for frames {format_frames(sequence.gaps)}; going on without"
+        )
     if sequence.sub_frames:
         count, first = len(sequence.sub_frames), sequence.sub_frames[0].name
-        say(f"{pattern}: leaving out {count} sub-frames ({first}, …); only whole frames are used")
+        watch.note(
+            f"{pattern}: leaving out {count} sub-frames ({first}, …); only whole frames are used"
+        )
     return sequence
 
 
+<<<<<<< HEAD:src/vnca/cli/sequence.py
 def read_alone(path: Path, smoke: SmokeFormat) -> Volume:
     """A frame on a lattice of its own; if its voxels are not those cells, a note says so.
+=======
+def read_alone(path: Path, smoke: SmokeFormat, watch: Watch) -> Volume:
+    """A frame on a lattice of its own; if its voxels are not those cells, that is told.
+>>>>>>> recipe:src/vnca/recipe/sequence.py
 
     Raises:
         VncaError: If it cannot be read, or can have no place on a lattice.
@@ -50,7 +68,7 @@ def read_alone(path: Path, smoke: SmokeFormat) -> Volume:
     lattice = Lattice.of(volume.index_to_world, what)
     place = Placement.between(volume.index_to_world, lattice.to_world, volume.box, what)
     if not place.is_whole:
-        _tell_resampled(path, volume.index_to_world, lattice, others=0)
+        watch.note(_resampled(path, volume.index_to_world, lattice, others=0))
     return on_lattice(volume, lattice, what)
 
 
@@ -66,14 +84,14 @@ def beside(path: Path, smoke: SmokeFormat) -> SmokeFormat:
     places = [at for at, frame in enumerate(frames) if frame.path == path]
     if not places:
         raise SequenceError(
-            f"{path}: not a numbered frame, so --velocity-scale fit has no neighbour to fit to; "
+            f"{path}: not a numbered frame, so `velocity_scale` fit has no neighbour to fit to; "
             "set a number"
         )
     return with_fitted_scale(smoke, frames[max(0, places[0] - 1) : places[0] + 2])
 
 
 def sequence_region(
-    sequence: FrameSequence, smoke: SmokeFormat, *, without_broken: bool = False
+    sequence: FrameSequence, smoke: SmokeFormat, watch: Watch, *, without_broken: bool = False
 ) -> Region:
     """The lattice of a sequence, and the box in it that holds the smoke of all frames.
 
@@ -83,6 +101,7 @@ def sequence_region(
     Args:
         sequence: The frames.
         smoke: How they are read.
+        watch: Is told of frames that are interpolated.
         without_broken: Pass over frames that cannot be read, unless none can.
 
     Raises:
@@ -111,7 +130,7 @@ def sequence_region(
     if lattice is None:
         raise _without_smoke(sequence)
     if resampled:
-        _tell_resampled(*resampled[0], lattice, others=len(resampled) - 1)
+        watch.note(_resampled(*resampled[0], lattice, others=len(resampled) - 1))
     return Region(lattice, box)
 
 
@@ -146,7 +165,7 @@ def require_dense_enough(sequence: FrameSequence, smoke: SmokeFormat, scale: flo
             f"{sequence[0].path.parent}: nothing would be painted, as the greatest density of all "
             f"frames, {most:.3g}, is below {SMOKE_THRESHOLD:.0%} of the one that counts as 1, "
             f"{scale:.3g}; "
-            + (f"try --density-scale {typical:.3g}" if most else "choose others with --frames")
+            + (f"try `density_scale` {typical:.3g}" if most else "choose others with `frames`")
         )
 
 
@@ -156,10 +175,10 @@ def _covered(extent: Extent, lattice: Lattice, what: str) -> tuple[Box, bool]:
     return place.box(extent.box), place.is_whole
 
 
-def _tell_resampled(path: Path, index_to_world: AnyArray, lattice: Lattice, *, others: int) -> None:
+def _resampled(path: Path, index_to_world: AnyArray, lattice: Lattice, *, others: int) -> str:
     sides = " × ".join(f"{side:g}" for side in np.linalg.norm(index_to_world[:3, :3], axis=0))
     also = f", as is that of {others} more" * (others > 0)
-    say(
+    return (
         f"{path}: its voxels, {sides}, are not the cells of the sequence's lattice, cubes of "
         f"{lattice.spacing:g}; its smoke is resampled to those{also}"
     )
@@ -192,11 +211,26 @@ def region_bounds(box: Box, index_to_world: AnyArray) -> tuple[AnyArray, AnyArra
 def _without_smoke(sequence: FrameSequence) -> SequenceError:
     return SequenceError(
         f"{sequence[0].path.parent}: there is no smoke in any frame; "
-        "choose others with --frames or another grid with --density-grid"
+        "choose others with `frames` or another grid with `density_grid`"
     )
 
 
-def placed(rule: Rule, region: Region) -> Rule:
+def region_of(given: Iterable[Volume]) -> tuple[list[Volume], Region]:
+    """Volumes as they lie on one lattice, and what of it holds the smoke of them all.
+
+    Raises:
+        SequenceError: If there is no smoke in any.
+        GridError: If one can have no place on the lattice.
+    """
+    laid = [*on_one_lattice(given)]
+    smoke = [volume for volume in laid if volume.density_field.values.any()]
+    if not smoke:
+        raise SequenceError("`sequence`: there is no smoke in any of the volumes")
+    box = reduce(Box.union, (volume.box for volume in smoke))
+    return laid, Region(Lattice(smoke[0].index_to_world), box)
+
+
+def placed(rule: Rule, region: Region, watch: Watch) -> Rule:
     """A rule as it is for a region: apart from where it was trained, that has positions of its own.
 
     A rule that is conditioned on position would else see the same position in all cells; a note
@@ -211,9 +245,15 @@ def placed(rule: Rule, region: Region) -> Rule:
     corners = place.cells(ends)
     if (corners.max(axis=0) > lower).all() and (corners.min(axis=0) < upper).all():
         return rule
+<<<<<<< HEAD:src/vnca/cli/sequence.py
     say(
         "the smoke lies apart from where the rule was trained; positions, on which "
         "the rule is conditioned, are those in the box of this sequence"
+=======
+    watch.note(
+        "the smoke lies apart from where the rule was trained, which tells cells their position: "
+        "they are told that in the box of this sequence"
+>>>>>>> recipe:src/vnca/recipe/sequence.py
     )
     return replace(rule, place=None)
 

@@ -1,6 +1,7 @@
-"""Options of a command as JSON, and back: to ask later for what was asked for before."""
+"""What runs and models record of their options and inputs, and how it is read back."""
 
 import dataclasses
+import json
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -9,8 +10,10 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 from vnca.core.errors import ModelError
 from vnca.io.smoke_format import SmokeFormat
-from vnca.rule.model import Model, from_record
+from vnca.rule.model import CONFIG_NAME, Model, from_record
 
+IN_MEMORY = Path("in-memory")
+"""In the place of the path of an input that came from no file."""
 PICTURE_CELLS = "picture_cells"
 """What says in a model how many cells wide the rule was shown its picture, the shorter side."""
 
@@ -73,3 +76,25 @@ def recorded_smoke(path: Path, model: Model) -> SmokeFormat | None:
         return from_record(SmokeFormat, smoke)
     except TypeError as error:
         raise ModelError(f"{path}: damaged model metadata (smoke: {error})") from error
+
+
+def load(path: str | Path) -> Model:
+    """Read a model file, or the model in the folder of a run, with where its inputs are.
+
+    Raises:
+        FileFormatError: If the file is missing or empty.
+        ModelError: If it is not a model, of a newer format, or inconsistent.
+    """
+    path = Path(path)
+    folder = path if path.is_dir() else path.parent
+    try:
+        told = json.loads((folder / CONFIG_NAME).read_text())["inputs"]
+        inputs = {name: Path(where) for name, where in told.items() if isinstance(where, str)}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        inputs = {}
+    return dataclasses.replace(Model.load(path), inputs=inputs)
+
+
+def loaded(model: str | Path | Model) -> Model:
+    """The model itself, or that of a path; errors as of `load`."""
+    return model if isinstance(model, Model) else load(model)

@@ -1,0 +1,346 @@
+"""Measuring how well a rule paints a sequence."""
+
+import dataclasses
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any, Literal
+
+import vnca
+from vnca.bench.machine import run_facts
+from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.files import whole_file, writable_folder
+from vnca.core.lattice import Region
+from vnca.core.typing import AnyArray, FloatArray
+from vnca.core.volume import Volume
+from vnca.core.watch import SILENT, Watch, tracked
+from vnca.engine.session import Compute
+from vnca.features.load import load_network
+from vnca.io.picture import read_image, style_array
+from vnca.io.sequence import FrameSequence, format_frames
+from vnca.io.smoke import SmokeFormat, with_fitted_scale
+from vnca.io.smoke_format import NO_VELOCITY
+from vnca.metrics.judges import Judge
+from vnca.metrics.measures import Measure, measures
+from vnca.metrics.report import report
+from vnca.metrics.setup import SIZE, Setup
+from vnca.metrics.style import SMALLEST, StyleMetric
+from vnca.metrics.survey import Survey, survey
+from vnca.painting.config import StylizeConfig
+from vnca.painting.roll import stylize
+from vnca.recipe.options import distributed
+from vnca.recipe.recorded import IN_MEMORY, PICTURE_CELLS, loaded, recorded_smoke
+from vnca.recipe.sequence import open_sequence, placed, region_of, sequence_region, volumes
+from vnca.rule.model import Model
+
+REPORT_NAME = "report.html"
+MEASURES_NAME = "report.json"
+LARGEST = 4096
+"""Pixels along the shorter side of the picture."""
+JUDGES = ("edges", "efficientnet")
+"""Networks that compare the painting with the picture, whichever the rule was trained with."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluateRun:
+    """How a rule is measured on a sequence."""
+
+    run: Path
+    """A model file, or the folder of a training run."""
+    sequence: str | None = None
+    """A folder, a pattern or a file; the frame of the training unless given."""
+    out: Path | None = None
+    """Folder for report.html and report.json; nothing is written unless given."""
+    frames: str | None = None
+    """Frames to paint, such as 30-53 or 1,4,7-9; all unless given."""
+    style: Path | None = None
+    """The picture; that of the training unless given."""
+    style_scale: float | None = None
+    """Shorter side of the picture relative to the views; as many cells as in the training unless
+    given."""
+    refine: Literal[1, 2, 3, 4] = 1
+    """Paint on a grid so many times as fine as that of the smoke."""
+    size: int = SIZE
+    """Rows and columns of the views, pixels."""
+    backend: str = "auto"
+    """What computes the automaton."""
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
+    """How smoke is read from files."""
+    config: StylizeConfig = field(default_factory=StylizeConfig)
+    """How the rule is applied."""
+
+    def __post_init__(self) -> None:
+        Compute(self.backend)
+        if self.size < 64:
+            raise OptionError(f"`size` {self.size}: at least 64 pixels are needed")
+        if self.style_scale is not None:
+            _checked_size(self.size * self.style_scale, f"`style_scale` {self.style_scale:g}")
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """What was measured; printed, a table.
+
+    Attributes:
+        measures: Each with a name, a value, and what it means.
+        survey: What they were computed from, with pictures.
+        report: The HTML page, if one was written.
+    """
+
+    measures: tuple[Measure, ...]
+    survey: Survey
+    report: Path | None = None
+
+    def __getitem__(self, name: str) -> float | None:
+        """The value of a measure, such as `style.gap_closed`; None if it could not be measured."""
+        return {measure.name: measure.value for measure in self.measures}[name]
+
+    def __str__(self) -> str:
+        lines = [f"{'':22}{'painted':>10}{'unstylized':>12}  better"]
+        for measure in self.measures:
+            value, plain = (
+                "-" if number is None else f"{number:.3f}"
+                for number in (measure.value, measure.unstylized)
+            )
+            lines.append(f"{measure.name:22}{value:>10}{plain:>12}  {measure.better or '-'}")
+        return "\n".join(lines)
+
+    def as_json(self) -> dict[str, Any]:
+        """All measures by name, as JSON values."""
+        return {measure.name: measure.as_json() for measure in self.measures}
+
+
+def evaluate(
+    model: str | Path | Model,
+    sequence: str | Path | Volume | Iterable[Volume] | None = None,
+    *,
+    style: str | Path | AnyArray | None = None,
+    out: str | Path | None = None,
+    frames: str | None = None,
+    style_scale: float | None = None,
+    refine: Literal[1, 2, 3, 4] = 1,
+    size: int = SIZE,
+    backend: str = "auto",
+    watch: Watch = SILENT,
+    **options: Any,
+) -> Evaluation:
+    """Paint a sequence and measure how well, as `vnca evaluate` does.
+
+    Args:
+        model: What `train` returned, or the path of a model or of the folder of a run.
+        sequence: A folder, a pattern (`smoke_####.vdb`) or a file; or volumes in order. The frame
+            of the training unless given.
+        style: The picture, a file or an array `[r, c, 3]` of linear RGB; that of the training
+            unless given.
+        out: Folder for report.html and report.json; nothing is written unless given.
+        frames: Which frames of a sequence in files, such as `30-53`; all unless given.
+        style_scale: Shorter side of the picture relative to the views; as many cells as in the
+            training unless given.
+        refine: Paint on a grid so many times as fine as the smoke's.
+        size: Rows and columns of the views, pixels.
+        backend: What computes the automaton.
+        watch: Is told how far it has come, and may cancel.
+        **options: Fields of `SmokeFormat`, in the place of those that the training recorded, and of
+            `StylizeConfig`.
+
+    Raises:
+        VncaError: If an input cannot be used or the output cannot be written.
+    """
+    name = IN_MEMORY if isinstance(model, Model) else Path(model)
+    model = loaded(model)
+    recorded = recorded_smoke(name, model) or SmokeFormat()
+    smoke, config = distributed(options, recorded, StylizeConfig())
+    if sequence is None and isinstance(model.inputs.get("frame"), Volume):
+        sequence = model.inputs["frame"]
+    if isinstance(sequence, Volume):
+        sequence = [sequence]
+    asked = EvaluateRun(
+        run=name,
+        sequence=str(sequence) if isinstance(sequence, (str, Path)) else None,
+        out=None if out is None else Path(out),
+        frames=frames,
+        style=Path(style) if isinstance(style, (str, Path)) else None,
+        style_scale=style_scale,
+        refine=refine,
+        size=size,
+        backend=backend,
+        smoke=smoke,
+        config=config,
+    )
+    if style is not None and not isinstance(style, (str, Path)):
+        model = dataclasses.replace(model, inputs={**model.inputs, "style": style_array(style)})
+    if sequence is None or isinstance(sequence, (str, Path)):
+        return run(asked, model, watch)
+    if frames is not None:
+        raise OptionError("`frames`: chooses among files; give the volumes that are wanted")
+    given, region = region_of(sequence)
+    smoke_given = _Smoke(region, len(given), lambda _: iter(given), "volumes in memory", "memory")
+    return run(asked, model, watch, smoke_given)
+
+
+@dataclass(frozen=True)
+class _Smoke:
+    """A sequence to be read as often as wanted: where it is, and what a report calls it."""
+
+    region: Region
+    count: int
+    read: Callable[[bool], Iterator[Volume]]
+    first: str
+    folder: str
+
+
+def run(
+    options: EvaluateRun, model: Model, watch: Watch, given: _Smoke | None = None
+) -> Evaluation:
+    """Paint and measure, and write the report if there is a folder for it.
+
+    Args:
+        options: What is asked.
+        model: That of the run.
+        watch: Is told how far it has come.
+        given: The smoke, if it is not in files.
+
+    Raises:
+        VncaError: If an input cannot be used or the output cannot be written.
+    """
+    out = None if options.out is None else writable_folder(options.out)
+    picture = _picture(options, model)
+    sequence = None
+    if given is None:
+        sequence = open_sequence(_sequence(options, model), options.frames, watch)
+    width = _compared_width(options, model)
+    if sequence is not None:
+        given = _files(sequence, options, watch)
+    assert given is not None, "it was given, or else there is a sequence"
+    rule = placed(model.rule, given.region, watch)
+    refine = options.refine
+    # Once for where the smoke is, and once to paint: there may be too many frames to keep.
+    setup = Setup.around(given.read(False), rule, options.size).refined(refine)
+    metric = StyleMetric(picture, _checked_size(width(setup), f"`size` {options.size}"))
+    paintings = stylize(
+        given.read(True),
+        rule,
+        options.config,
+        box=given.region.box,
+        refine=refine,
+        compute=Compute(options.backend),
+    )
+    paintings = tracked(paintings, watch, "painting and measuring", given.count, "frames")
+    judges = _judges(model, metric, options.size)
+    found = survey(paintings, given.count, rule.refined(refine), setup, metric, judges)
+    listed = measures(found)
+    watch.note(f"trained with features '{model.training.get('features', 'unknown')}'")
+    if out is None:
+        return Evaluation(listed, found)
+    evaluation = Evaluation(listed, found, out / REPORT_NAME)
+    page = report(found, listed, picture, _facts(options, model, found, given))
+    with whole_file(out / REPORT_NAME) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    with whole_file(out / MEASURES_NAME) as temporary:
+        temporary.write_text(json.dumps(evaluation.as_json(), indent=2) + "\n")
+    watch.made("report", out / REPORT_NAME)
+    return evaluation
+
+
+def _files(sequence: FrameSequence, options: EvaluateRun, watch: Watch) -> _Smoke:
+    smoke = with_fitted_scale(options.smoke, sequence)
+    still = dataclasses.replace(smoke, velocity_grid=NO_VELOCITY)
+    region = sequence_region(sequence, smoke, watch)
+    first = sequence[0].path
+    return _Smoke(
+        region,
+        len(sequence),
+        lambda moving: volumes(sequence, smoke if moving else still, region.lattice),
+        first.name,
+        first.resolve().parent.name,
+    )
+
+
+def _facts(options: EvaluateRun, model: Model, found: Survey, smoke: _Smoke) -> Mapping[str, str]:
+    """What a report tells of what was measured."""
+    folder = run_folder_of(options.run).resolve().name
+    return {
+        "title": f"{folder} on {smoke.folder}",
+        "picture": str(model.training.get("style", options.style)),
+        "frames": f"{format_frames(found.frames)} of {smoke.first} …",
+        "training": ", ".join(
+            f"{name} {model.training[name]}"
+            for name in ("preset", "iterations", "seed", "features")
+            if name in model.training
+        ),
+        "measured": f"by vnca {vnca.__version__}, {run_facts('cpu', 1)['date']} UTC, "
+        f"at {options.size}×{options.size} pixels"
+        + (f", painted on a grid {options.refine} times as fine" if options.refine > 1 else ""),
+    }
+
+
+def run_folder_of(run: Path) -> Path:
+    """The folder of a run that is named by it, or by its model file."""
+    return run if run.is_dir() else run.parent
+
+
+def _judges(model: Model, metric: StyleMetric, size: int) -> list[Judge]:
+    """The networks, each with whether the rule was trained with it; those not installed say so."""
+    found = []
+    for name in JUDGES:
+        origin = model.training.get("features_origin")
+        try:
+            network = load_network(name)
+        except BackendUnavailableError as error:
+            found.append(Judge(name, model.training.get("features") == name, str(error)))
+            continue
+        trained_with = None if origin is None else origin == network.origin
+        found.append(Judge.of(network, trained_with, metric, size))
+    return found
+
+
+def _picture(options: EvaluateRun, model: Model) -> FloatArray:
+    """The style picture: the one given, that of the training, or ours of the same name."""
+    known = options.style or model.inputs.get("style")
+    if isinstance(known, Path):
+        return read_image(known)
+    if known is not None:
+        return known
+    name = str(model.training.get("style"))
+    ours = files("vnca.data").joinpath(Path(name).name)
+    if not ours.is_file():
+        raise OptionError(
+            f"{options.run}: does not tell where its picture '{name}' is; name it with `style`"
+        )
+    with as_file(ours) as path:
+        return read_image(path)
+
+
+def _compared_width(options: EvaluateRun, model: Model) -> Callable[[Setup], float]:
+    """Pixels along the picture's shorter side on a setup: as many cells as the rule was shown."""
+    if options.style_scale is not None:
+        pixels = options.size * options.style_scale
+        return lambda _: pixels
+    cells = model.training.get(PICTURE_CELLS)
+    if not isinstance(cells, (int, float)):
+        raise OptionError(
+            f"{options.run}: does not tell how many cells wide its picture was; set `style_scale`"
+        )
+    return lambda setup: cells * setup.scale
+
+
+def _checked_size(pixels: float, option: str) -> int:
+    """The picture's shorter side where it is compared."""
+    if not SMALLEST <= pixels <= LARGEST:
+        raise OptionError(
+            f"{option}: makes the picture {pixels:.0f} pixels wide, of {SMALLEST} to {LARGEST}"
+        )
+    return round(pixels)
+
+
+def _sequence(options: EvaluateRun, model: Model) -> str:
+    """The sequence named, or the frame of the training."""
+    path = options.sequence or model.inputs.get("frame")
+    if path is None:
+        raise OptionError(
+            f"{options.run}: does not tell where the smoke is that it was trained on; "
+            "name a sequence"
+        )
+    return str(path)

@@ -1,0 +1,256 @@
+"""Painting a sequence of smoke with a trained rule: from files to files, or in memory."""
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+from typing import Literal
+
+import vnca
+from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.files import remove_leftovers, writable_file, writable_folder
+from vnca.core.volume import refined_transform
+from vnca.core.watch import Watch
+from vnca.engine.backend import choose
+from vnca.engine.session import Compute
+from vnca.io.film import SUFFIXES as FILMS
+from vnca.io.painted import read_colour
+from vnca.io.provenance import read_provenance
+from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
+from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
+from vnca.painting.config import StylizeConfig
+from vnca.painting.painter import OnError, Painter
+from vnca.painting.roll import Roll
+from vnca.recipe.film import Film, FilmConfig, Shown
+from vnca.recipe.sequence import (
+    open_sequence,
+    placed,
+    region_bounds,
+    require_dense_enough,
+    sequence_region,
+)
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule
+
+
+@dataclass(frozen=True, kw_only=True)
+class StylizeRun:
+    """A painting of a sequence in files."""
+
+    model: Path
+    """A model file, or the folder of a training run."""
+    sequence: str
+    """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
+    out: Path
+    """Folder for the painted frames, which keep their names."""
+    frames: str | None = None
+    """Frames to paint, such as 30-53 or 1,4,7-9; all unless given."""
+    colour_grid: tuple[str, ...] = ("Cd",)
+    """Names under which the colour is written: Cd, `color` as Blender names it, or several."""
+    preview: Path | None = None
+    """Film of the painting: mp4, gif or webp."""
+    refine: Literal[1, 2, 3, 4] = 1
+    """Paint on a grid so many times as fine as that of the smoke."""
+    gamma: float | None = None
+    """Extinction of density 1, per cell of the smoke, with which the painting is to be seen:
+    brightness without training again. It is told in the files."""
+    density_scale: float | None = None
+    """Density that counts as 1; that of the training frame unless given."""
+    backend: str = "auto"
+    """What computes the automaton."""
+    precision: str = "float32"
+    """What the native kernel rounds the factors of its products to; bfloat16 is quicker where the
+    processor has it."""
+    resume: bool = False
+    """Go on with a painting that was ended before its last frame, to the very same files."""
+    on_error: OnError = "stop"
+    """With a frame that cannot be read: stop, skip it, or hold the smoke of the one before."""
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
+    """How smoke is read from files."""
+    config: StylizeConfig = field(default_factory=StylizeConfig)
+    """How the rule is applied."""
+    film: FilmConfig = field(default_factory=FilmConfig)
+    """How the preview is filmed."""
+
+    def __post_init__(self) -> None:
+        Compute(self.backend, precision=self.precision)
+        for name in ("gamma", "density_scale"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < inf:
+                raise OptionError(f"`{name}` {value}: must be positive")
+        if self.preview is not None and self.preview.suffix.lower() not in FILMS:
+            raise OptionError(f"`preview` {self.preview}: expected a film ({', '.join(FILMS)})")
+        if not self.colour_grid:
+            raise OptionError("`colour_grid`: at least one name is needed")
+        names = (self.smoke.density_grid, *self.colour_grid)
+        if len(set(names)) < len(names):
+            raise OptionError(
+                f"`colour_grid` {' '.join(self.colour_grid)}: each needs a name of its own, not "
+                f"that of another or of the density ({self.smoke.density_grid})"
+            )
+
+
+def with_scales(options: StylizeRun, rule: Rule) -> Rule:
+    """The rule with the density that counts as 1, and the γ, that are asked for."""
+    scales = dataclasses.replace(
+        rule.scales,
+        density=options.density_scale or rule.scales.density,
+        gamma=options.gamma or rule.scales.gamma,
+    )
+    return dataclasses.replace(rule, scales=scales)
+
+
+def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterator[Path | None]:
+    """Make ready to paint as asked; memory does not grow with the length of the sequence.
+
+    Args:
+        options: What to paint, and how.
+        watch: Is told how far it has come. What it raises ends the painting once a frame is
+            finished.
+        model: The model of the options, if it is loaded already.
+
+    Returns:
+        What paints: the file of each frame as it is finished, None for one that is left out.
+
+    Raises:
+        VncaError: If an input cannot be used or the output cannot be written.
+    """
+    model = model or Model.load(options.model)
+    rule = with_scales(options, model.rule)
+    sequence = open_sequence(options.sequence, options.frames, watch)
+    writable_folder(options.out)
+    if options.preview:
+        writable_file(options.preview)
+        remove_leftovers(options.preview.parent, [options.preview.name])
+    if any(f.path.resolve().parent == options.out.resolve() for f in sequence):
+        raise OptionError(f"`out` {options.out}: is the folder of the input; choose another")
+    smoke = with_fitted_scale(options.smoke, sequence)
+    region = sequence_region(sequence, smoke, watch, without_broken=options.on_error != "stop")
+    require_dense_enough(sequence, smoke, rule.scales.density)
+    rule = placed(rule, region, watch)
+    compute = Compute(options.backend, precision=options.precision)
+    backend = choose(compute).name
+    roll = Roll(rule, options.config, region.box, compute).refined(options.refine)
+    facts = _facts(options, model, roll)
+    painter = Painter(
+        sequence,
+        options.out,
+        roll,
+        region.lattice,
+        smoke,
+        options.colour_grid,
+        options.on_error,
+        conditions={
+            "the version of vnca": vnca.__version__,
+            "`refine`": options.refine,
+            "the model": _digest(rule),
+            "the list of frames": [frame.path.name for frame in sequence],
+            "the place of its cells in the world": region.lattice.to_world.tolist(),
+            "the box of the smoke": region.box,
+            "`backend`": backend,
+            "`precision`": options.precision,
+            "`density_scale`": rule.scales.density,
+            "`gamma`": rule.scales.gamma,
+            "the name of the model": facts["model"],
+            "`colour_grid`": options.colour_grid,
+            **{
+                f"`{name}`": value
+                for values in (options.config, smoke)
+                for name, value in dataclasses.asdict(values).items()
+            },
+            "`steps_per_frame`": roll.steps_per_frame,
+            "`domain`": roll.domain_kind,
+        },
+        tell=watch.note,
+        refine=options.refine,
+        facts=facts,
+    )
+    return _paint(painter, options, watch)
+
+
+def _digest(rule: Rule) -> str:
+    """Equal for rules that paint equally."""
+    shape = dataclasses.asdict(rule.config)
+    place = rule.place and [rule.place.lattice.to_world.tolist(), rule.place.box]
+    described = json.dumps([shape, rule.scales.velocity, place])
+    digest = hashlib.blake2b(described.encode(), digest_size=16)
+    for weights in (rule.hidden, rule.bias, rule.output):
+        digest.update(weights.tobytes())
+    return digest.hexdigest()
+
+
+def _paint(painter: Painter, options: StylizeRun, watch: Watch) -> Iterator[Path | None]:
+    """The files of the frames, painted to the end, or until `watch` or the caller ends it."""
+    total, finished = len(painter.sequence), 0
+    with ExitStack() as stack:
+        film = _film(options, painter, stack, watch)
+        unfinished = painter.begin(resume=options.resume)
+        already = len(unfinished.sources)
+        try:
+            with closing(painter.paint(unfinished)) as paths:
+                watch.progress("painting", already, total, "frames")
+                for finished, (frame, path) in enumerate(
+                    zip(painter.sequence, paths, strict=True), 1
+                ):
+                    if film is not None and path is not None:
+                        film.add(read_painted(path, frame.path, options))
+                    yield path
+                    if finished > already:
+                        watch.progress("painting", finished, total, "frames")
+        except KeyboardInterrupt:
+            done = max(already, finished)
+            watch.note(f"stopped after {done} of {total} frames; `resume` goes on")
+            raise
+    painter.discard()
+    watch.made("painted", options.out)
+    if film is not None and options.preview is not None:
+        watch.made("film", options.preview)
+
+
+def _film(options: StylizeRun, painter: Painter, stack: ExitStack, watch: Watch) -> Film | None:
+    """The film of a preview, if one is wanted and what it takes is installed."""
+    if options.preview is None:
+        return None
+    cells = refined_transform(painter.lattice.to_world, options.refine)
+    bounds = region_bounds(painter.roll.box, cells)
+    try:
+        film = Film(options.preview, options.film, bounds, frames=len(painter.sequence))
+        return stack.enter_context(film)
+    except BackendUnavailableError as error:
+        later = f"vnca render {options.out} `out` {options.preview}"
+        watch.note(f"{error}; painting without a preview, which {later} makes later")
+        return None
+
+
+def read_painted(path: Path, source: Path, options: StylizeRun) -> Shown:
+    """A painted frame as its file has it: the film is the same with `resume`, and by `render`."""
+    up = up_axis_of(source, options.smoke)
+    format = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY, up_axis=up)
+    smoke, told = read_smoke(path, format), read_provenance(path)
+    colour = read_colour(path, format, grid=options.colour_grid[0], box=smoke.box)
+    assert told is not None, "it was written a moment ago"
+    assert colour is not None, "it was written a moment ago"
+    return Shown(smoke, colour, told.extinction)
+
+
+def _facts(options: StylizeRun, model: Model, roll: Roll) -> dict[str, str | int | float]:
+    """What painted files tell of the rule and the options, beside what they are painted from."""
+    path = options.model.resolve()
+    name = path.parent.name if path.name == MODEL_NAME else path.stem
+    config = options.config
+    return {
+        "version": vnca.__version__,
+        "model": name,
+        "style": str(model.training.get("style", "")),
+        "refine": options.refine,
+        "strength": config.strength,
+        "density_strength": config.density_strength,
+        "steps_per_frame": roll.steps_per_frame,
+        "warmup": config.warmup,
+        "domain": roll.domain_kind,
+        "seed": config.seed,
+    }

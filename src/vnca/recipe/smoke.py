@@ -1,0 +1,338 @@
+"""Training on smoke as it gives good pictures: first a solid texture, then one frame of smoke."""
+
+import dataclasses
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+
+from vnca.core.errors import GridError, OptionError
+from vnca.core.files import remove_file
+from vnca.core.lattice import Lattice
+from vnca.core.typing import AnyArray, FloatArray
+from vnca.core.volume import Volume
+from vnca.core.watch import SILENT, Watch
+from vnca.features.load import load_network
+from vnca.features.network import FeatureNetwork
+from vnca.io.orientation import on_lattice
+from vnca.io.picture import read_style, style_array
+from vnca.io.smoke import SmokeFormat, missing_velocity
+from vnca.io.smoke_format import NO_VELOCITY
+from vnca.recipe import texture
+from vnca.recipe.options import distributed, named
+from vnca.recipe.recorded import IN_MEMORY, load
+from vnca.recipe.sequence import beside, read_alone
+from vnca.recipe.session import (
+    ResumeOptions,
+    Session,
+    TrainingOptions,
+    asked,
+    choose_device,
+    fitting,
+    interrupted,
+    run_folder,
+    shown_and_judged,
+)
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule, RuleConfig
+from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
+from vnca.training.memory import memory_budget
+from vnca.training.pretraining import SHAPE, SHARES, pretraining_config, without_prior_weights
+from vnca.training.smoke_config import PRESETS, SmokeConfig
+from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.texture_config import TextureConfig
+
+COMMAND = "train"
+TEXTURE_FOLDER = "texture"
+"""Folder, in that of a run, of the texture that it begins with."""
+
+Preset = Literal["draft", "standard", "paper"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmokeRun(TrainingOptions):
+    """A training of a rule on one frame of smoke and one picture."""
+
+    frame: Path
+    """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
+    style: Path
+    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
+    preset: Preset = "draft"
+    """Values of all hyperparameters that are not given."""
+    texture: float | None = None
+    """Iterations on a solid texture of the picture for each one on the smoke, made before those:
+    patterns come from there. 0 begins with nothing."""
+    begin_with: Path | None = None
+    """A solid texture of the picture that is trained already, to begin with instead."""
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
+    """How smoke is read from files."""
+    config: SmokeConfig = field(default_factory=SmokeConfig)
+    """Hyperparameters."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.texture is not None and not 0 <= self.texture <= 1000:
+            raise OptionError(f"`texture` {self.texture:g}: must be from 0 to 1000")
+        if self.texture is not None and self.begin_with is not None:
+            raise OptionError("`texture`, `begin_with`: one of them, not both")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResumeSmokeRun(ResumeOptions):
+    """What may be asked when a training on smoke is resumed."""
+
+    frame: Path | None = None
+    """The frame, if it is no longer where it was."""
+    style: Path | None = None
+    """The picture, if it is no longer where it was."""
+
+
+def train(
+    frame: str | Path | Volume,
+    style: str | Path | AnyArray,
+    *,
+    out: str | Path | None = None,
+    preset: Preset = "draft",
+    texture: float | None = None,
+    begin_with: str | Path | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    preview_every: int = 50,
+    device: str = "auto",
+    memory_budget: str = "auto",
+    watch: Watch = SILENT,
+    **options: Any,
+) -> Model:
+    """Learn from one frame of smoke and one picture how to paint, as `vnca train` does.
+
+    Args:
+        frame: A file of smoke, or a volume with velocity in cells a frame.
+        style: A picture file, or an array `[r, c, 3]` of linear RGB from 0 to 1.
+        out: Folder for the model, checkpoints, previews and loss curves. Unless given, nothing is
+            written, and a training that is cancelled is lost.
+        preset: `draft` takes minutes, `standard` a night on a laptop; `paper` is the paper's.
+        texture: Iterations on a solid texture for each one on the smoke, made before those; chosen
+            by the preset unless given.
+        begin_with: A texture model of the picture to begin with instead.
+        overwrite: Replace the run that `out` holds.
+        resume: Go on with the training that was interrupted in `out`, with the options that it
+            began with, or else begin it.
+        preview_every: Iterations between preview pictures.
+        device: `auto`, `cpu` or `cuda`.
+        memory_budget: Memory for the program, such as `12GB`.
+        watch: Is told how far it has come, and may cancel.
+        **options: Fields of `SmokeFormat` (`velocity_units="mantaflow"`) and of `SmokeConfig`
+            (`iterations=400`, `view={"size": 96}`), in the place of the preset's.
+
+    Raises:
+        VncaError: If an input cannot be used, the folder cannot be written, training diverges, or
+            memory runs out.
+        KeyboardInterrupt: If it is cancelled; the folder holds what it takes to resume.
+    """
+    smoke, config = distributed(options, SmokeFormat(), named(preset, PRESETS, "preset"))
+    volume = frame if isinstance(frame, Volume) else None
+    picture = None if isinstance(style, (str, Path)) else style_array(style)
+    asked = SmokeRun(
+        frame=IN_MEMORY if isinstance(frame, Volume) else Path(frame),
+        style=Path(style) if isinstance(style, (str, Path)) else IN_MEMORY,
+        out=None if out is None else Path(out),
+        preset=preset,
+        texture=texture,
+        begin_with=None if begin_with is None else Path(begin_with),
+        overwrite=overwrite,
+        preview_every=preview_every,
+        device=device,
+        memory_budget=memory_budget,
+        smoke=smoke,
+        config=config,
+    )
+    if resume:
+        if asked.out is None:
+            raise OptionError("`resume`: needs the folder of the training as `out`")
+        if (asked.out / CHECKPOINT_NAME).exists() or (asked.out / MODEL_NAME).exists():
+            again = ResumeSmokeRun(
+                resume=asked.out,
+                frame=asked.frame,
+                style=asked.style,
+                memory_budget=memory_budget,
+            )
+            return resume_run(again, watch, volume=volume, picture=picture)
+    return run(asked, watch, volume=volume, picture=picture)
+
+
+def run(
+    options: SmokeRun,
+    watch: Watch,
+    *,
+    checkpoint: Checkpoint | None = None,
+    volume: Volume | None = None,
+    picture: FloatArray | None = None,
+) -> Model:
+    """Train as asked, or go on from a checkpoint.
+
+    Args:
+        options: What is asked.
+        watch: Is told how far it has come.
+        checkpoint: Where the training was left.
+        volume: The frame, if it need not be read.
+        picture: The style picture, linear RGB `[r, c, 3]`, if it need not be read.
+
+    Raises:
+        VncaError: If an input cannot be used, the run folder cannot be written, training
+            diverges, or memory runs out.
+    """
+    folder = run_folder(options.out, overwrite=options.overwrite, checkpoint=checkpoint)
+    style = read_style(options.style) if picture is None else picture
+    device = choose_device(options.device)
+    if volume is None:
+        smoke_format = beside(options.frame, options.smoke)
+        smoke = read_alone(options.frame, smoke_format, watch)
+    else:
+        smoke_format = options.smoke
+        smoke = on_lattice(volume, Lattice.of(volume.index_to_world, "the frame"), "the frame")
+    if not smoke.density.any():
+        raise GridError(
+            f"{options.frame}: there is no smoke in this frame to train on; choose a later one"
+        )
+    config = options.config
+    if smoke.velocity is None:
+        if smoke_format.velocity_grid != NO_VELOCITY:
+            watch.note(f"{missing_velocity(options.frame)}; the rule learns nothing of motion")
+        # Or it would be told in painting what training has not told it the meaning of.
+        config = dataclasses.replace(
+            config, rule=dataclasses.replace(config.rule, velocity_prior=False)
+        )
+    torch.use_deterministic_algorithms(True)
+    network = load_network(config.features, device)
+    with fitting(config, "this frame"):
+        budget = memory_budget(options.memory_budget)
+        trainer = smoke_trainer(smoke, style, config, network, device=device, memory_budget=budget)
+    training = {
+        "frame": options.frame.name,
+        "style": options.style.name,
+        "preset": options.preset,
+        "seed": config.seed,
+        "device": str(device),
+        "smoke": dataclasses.asdict(smoke_format),
+        **shown_and_judged(trainer, network),
+    }
+    session = Session(
+        command=COMMAND,
+        trainer=trainer,
+        folder=folder,
+        style=style,
+        training=training,
+        inputs=training_inputs(smoke, style, config, network),
+        asked=asked(SmokeRun, dataclasses.replace(options, smoke=smoke_format)),
+        preview_every=options.preview_every,
+        watch=watch,
+    )
+    if checkpoint is None or not checkpoint.training:
+        if checkpoint is not None:
+            checkpoint.require(session.inputs, folder.checkpoint_path)
+        share = SHARES[options.preset] if options.texture is None else options.texture
+        beginning = pretraining_config(config, share, trainer.picture_cells)
+        if options.begin_with is not None:
+            trainer.begin_with(without_prior_weights(_given(options.begin_with, config.rule)))
+        elif beginning is not None:
+            if checkpoint is None and options.overwrite and options.out is not None:
+                # Resuming must not take the texture of the run that was there for this one's.
+                remove_file(options.out / TEXTURE_FOLDER / MODEL_NAME)
+            folder.reserve(Checkpoint({}, session.inputs, COMMAND, session.asked))
+            rule = _texture(options, beginning, style, watch, goes_on=checkpoint is not None)
+            trainer.begin_with(without_prior_weights(rule))
+        checkpoint = None
+    notes = []
+    if config.motion.weight and smoke.velocity is not None and not trainer.teaches_motion:
+        notes.append(f"{options.frame}: nothing moves in it; its texture is not taught to move")
+    model = session.run(checkpoint, *notes)
+    inputs = {
+        "frame": options.frame if volume is None else volume,
+        "style": options.style if picture is None else picture,
+    }
+    return dataclasses.replace(model, inputs=inputs)
+
+
+def training_inputs(
+    smoke: Volume, style: FloatArray, config: SmokeConfig, network: FeatureNetwork
+) -> dict[str, str]:
+    """What tells a training on smoke from others: the `fingerprints` of what goes into it."""
+    frame = [smoke.density, smoke.origin]
+    if smoke.velocity is not None:
+        frame.append(smoke.velocity)
+    return fingerprints(style, config, network, frame=frame)
+
+
+def _given(path: Path, wanted: RuleConfig) -> Rule:
+    """The texture to begin with that was named.
+
+    Raises:
+        VncaError: If it cannot be read, or is a rule of another shape.
+    """
+    rule = Model.load(path).rule
+    for name in SHAPE:
+        its, ours = (getattr(config, name) for config in (rule.config, wanted))
+        if its != ours:
+            raise OptionError(
+                f"`begin_with` {path}: was trained with `{name}` {its:g}; add that, in place of "
+                f"{ours:g}"
+            )
+    return rule
+
+
+def _texture(
+    options: SmokeRun,
+    config: TextureConfig,
+    style: FloatArray,
+    watch: Watch,
+    *,
+    goes_on: bool,
+) -> Rule:
+    """The texture to begin with, from the folder in the run's where it is, or may be already."""
+    picture = style if options.style == IN_MEMORY else None
+    out = None if options.out is None else options.out / TEXTURE_FOLDER
+    asked = texture.TextureRun(
+        style=options.style,
+        config=config,
+        out=out,
+        overwrite=options.overwrite or goes_on,
+        preview_every=options.preview_every,
+        device=options.device,
+        memory_budget=options.memory_budget,
+    )
+    if out is None:
+        watch.note("first, a solid texture")
+        return texture.run(asked, watch, picture=picture).rule
+    watch.note(f"first, a solid texture: {out}")
+    try:
+        if goes_on and (out / CHECKPOINT_NAME).exists():
+            again = texture.ResumeTextureRun(
+                resume=out, style=options.style, memory_budget=options.memory_budget
+            )
+            texture.resume_run(again, watch, picture=picture)
+        elif not (goes_on and (out / MODEL_NAME).exists()):
+            texture.run(asked, watch, picture=picture)
+    except KeyboardInterrupt:
+        watch.note(f"to go on with all of it: vnca {COMMAND} `resume` {options.out}")
+        raise
+    return Model.load(out).rule
+
+
+def resume_run(
+    options: ResumeSmokeRun,
+    watch: Watch,
+    *,
+    volume: Volume | None = None,
+    picture: FloatArray | None = None,
+) -> Model:
+    """Go on with a training, if there is something left to do; see `run` for the arguments.
+
+    Raises:
+        VncaError: If there is no checkpoint, an input changed, or as `run` says.
+    """
+    left = interrupted(COMMAND, SmokeRun, options, watch)
+    if left is None:
+        return load(options.resume)
+    begun, checkpoint = left
+    return run(begun, watch, checkpoint=checkpoint, volume=volume, picture=picture)

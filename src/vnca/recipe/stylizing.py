@@ -1,0 +1,195 @@
+"""Painting a sequence of smoke from Python: frames to iterate over, in files or in memory."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any, Literal
+
+from vnca.core.errors import OptionError
+from vnca.core.typing import FloatArray
+from vnca.core.volume import Volume
+from vnca.core.watch import SILENT, Watch, tracked
+from vnca.engine.session import Compute
+from vnca.io.sequence import find_frames
+from vnca.io.smoke import SmokeFormat, with_fitted_scale
+from vnca.painting.config import StylizeConfig
+from vnca.painting.painter import OnError
+from vnca.painting.roll import Painting
+from vnca.painting.roll import stylize as stylize_volumes
+from vnca.recipe.film import FilmConfig, Shown
+from vnca.recipe.options import changed, distributed
+from vnca.recipe.painting import StylizeRun, read_painted, run, with_scales
+from vnca.recipe.recorded import IN_MEMORY, loaded, recorded_smoke
+from vnca.recipe.sequence import (
+    open_sequence,
+    placed,
+    region_of,
+    require_dense_enough,
+    sequence_region,
+    volumes,
+)
+from vnca.rule.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class PaintedFrame:
+    """A frame of a painting, in a file or in memory.
+
+    Attributes:
+        number: That of the frame.
+        path: Its file; None in memory.
+    """
+
+    number: int
+    path: Path | None
+    _load: Callable[[], Shown] = field(repr=False)
+
+    @cached_property
+    def shown(self) -> Shown:
+        """What it takes to draw it; read from the file when it is first asked for."""
+        return self._load()
+
+    @property
+    def volume(self) -> Volume:
+        """Its painted density, on cells that lie where its matrix says."""
+        return self.shown.smoke
+
+    @property
+    def density(self) -> FloatArray:
+        """`[x, y, z]`, in the units of the smoke."""
+        return self.shown.smoke.density
+
+    @property
+    def colour(self) -> FloatArray:
+        """Linear RGB `[x, y, z, 3]` of the same cells."""
+        return self.shown.colour
+
+
+def stylize(
+    model: str | Path | Model,
+    sequence: str | Path | Volume | Iterable[Volume],
+    *,
+    out: str | Path | None = None,
+    frames: str | None = None,
+    refine: Literal[1, 2, 3, 4] = 1,
+    colour_grid: str | Sequence[str] = "Cd",
+    preview: str | Path | None = None,
+    gamma: float | None = None,
+    density_scale: float | None = None,
+    backend: str = "auto",
+    precision: str = "float32",
+    resume: bool = False,
+    on_error: OnError = "stop",
+    film: FilmConfig | Mapping[str, Any] | None = None,
+    watch: Watch = SILENT,
+    **options: Any,
+) -> Iterator[PaintedFrame]:
+    """Paint a sequence of smoke, one frame each time the iterator is asked for the next.
+
+    Whoever stops asking ends the painting; in a folder it can then be resumed.
+
+    Args:
+        model: What `train` returned, or the path of a model or of the folder of a run.
+        sequence: A folder, a pattern (`smoke_####.vdb`) or a file; or volumes in order.
+        out: Folder for the painted files. Unless given, frames are kept in memory while they are
+            used.
+        frames: Which frames of a sequence in files, such as `30-53`; all unless given.
+        refine: Paint on a grid so many times as fine as the smoke's.
+        colour_grid: Name or names under which files hold the colour.
+        preview: A film of the painting: mp4, gif or webp.
+        gamma: Extinction of density 1, per cell of the smoke; that of the training unless given.
+        density_scale: Density that counts as 1; that of the training frame unless given.
+        backend: What computes the automaton.
+        precision: What the native kernel rounds the factors of its products to.
+        resume: Go on with a painting in `out` that was ended early.
+        on_error: With a file that cannot be read: `stop`, `skip` it, or `hold` the frame before.
+        film: How the preview is filmed: a `FilmConfig`, or some of its fields.
+        watch: Is told how far it has come, and may cancel.
+        **options: Fields of `SmokeFormat`, in the place of those that the training recorded, and of
+            `StylizeConfig`.
+
+    Raises:
+        VncaError: At once if an input cannot be used or the output cannot be written; while
+            painting, if a frame cannot be read or written.
+    """
+    name = IN_MEMORY if isinstance(model, Model) else Path(model)
+    model = loaded(model)
+    recorded = recorded_smoke(name, model) or SmokeFormat()
+    smoke, config = distributed(options, recorded, StylizeConfig())
+    if isinstance(sequence, Volume):
+        sequence = [sequence]
+    asked = StylizeRun(
+        model=name,
+        sequence=str(sequence) if isinstance(sequence, (str, Path)) else "",
+        out=Path(out or ""),
+        frames=frames,
+        colour_grid=(colour_grid,) if isinstance(colour_grid, str) else tuple(colour_grid),
+        preview=None if preview is None else Path(preview),
+        refine=refine,
+        gamma=gamma,
+        density_scale=density_scale,
+        backend=backend,
+        precision=precision,
+        resume=resume,
+        on_error=on_error,
+        smoke=smoke,
+        config=config,
+        film=changed("film", FilmConfig(), film),
+    )
+    if out is not None:
+        if not isinstance(sequence, (str, Path)):
+            raise OptionError("`out`: volumes have no files to be painted beside; leave it out")
+        return _from_files(asked, run(asked, watch, model))
+    for option in ("preview", "resume"):
+        if getattr(asked, option):
+            raise OptionError(f"`{option}`: needs a folder for the painting as `out`")
+    if isinstance(sequence, (str, Path)):
+        return _in_memory(asked, model, None, watch)
+    if frames is not None:
+        raise OptionError("`frames`: chooses among files; give the volumes that are wanted")
+    return _in_memory(asked, model, [*sequence], watch)
+
+
+def _from_files(options: StylizeRun, paths: Iterator[Path | None]) -> Iterator[PaintedFrame]:
+    with closing(paths):  # type: ignore[type-var]
+        sources = find_frames(options.sequence, options.frames)
+        for source, path in zip(sources, paths, strict=True):
+            if path is not None:
+                load = partial(read_painted, path, source.path, options)
+                yield PaintedFrame(source.number, path, load)
+
+
+def _in_memory(
+    options: StylizeRun, model: Model, given: Sequence[Volume] | None, watch: Watch
+) -> Iterator[PaintedFrame]:
+    """What paints a sequence of files, or volumes, and keeps nothing."""
+    rule = with_scales(options, model.rule)
+    if given is None:
+        sequence = open_sequence(options.sequence, options.frames, watch)
+        smoke = with_fitted_scale(options.smoke, sequence)
+        region = sequence_region(sequence, smoke, watch)
+        require_dense_enough(sequence, smoke, rule.scales.density)
+        count, read = len(sequence), volumes(sequence, smoke, region.lattice)
+    else:
+        laid, region = region_of(given)
+        count, read = len(laid), iter(laid)
+    rule = placed(rule, region, watch)
+    paintings = stylize_volumes(
+        read,
+        rule,
+        options.config,
+        box=region.box,
+        refine=options.refine,
+        compute=Compute(options.backend, precision=options.precision),
+    )
+    refined = rule.refined(options.refine)
+
+    def frame(painting: Painting) -> PaintedFrame:
+        smoke = dataclasses.replace(painting.smoke, density=painting.density)
+        shown = Shown(smoke, painting.colour, refined.scales.extinction(smoke.cell_length))
+        return PaintedFrame(smoke.frame, None, lambda: shown)
+
+    return map(frame, tracked(paintings, watch, "painting", count, "frames"))

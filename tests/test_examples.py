@@ -1,0 +1,35 @@
+"""The examples run, each as its first lines say."""
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def example(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+# They train networks at their real size, if for an iteration only.
+@pytest.mark.slow
+def test_train_and_paint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example("train_and_paint").main(str(tmp_path / "out"), "1")
+    out = capsys.readouterr().out
+    assert "frame 24: " in out
+    assert "unstylized" in out
+    assert (tmp_path / "out" / "painted.gif").exists()
+
+
+@pytest.mark.slow
+def test_arrays(capsys: pytest.CaptureFixture[str]) -> None:
+    example("arrays").main("1")
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in lines] == [f"frame {n}" for n in range(1, 6)]
