@@ -5,7 +5,7 @@ wide, it stands out most; so each point of a ridge has a width. They are average
 ridges cover, weighed by their contrast.
 """
 
-from math import exp, log, pi, sqrt
+from math import pi, sqrt
 
 import numpy as np
 import torch
@@ -49,12 +49,16 @@ def stroke_width(picture: FloatArray) -> float | None:
     found = [_ridges(values, blur) for blur in blurs]
     total, logarithms = 0.0, 0.0
     for at in range(1, len(blurs) - 1):
-        strength, crest = found[at]
-        here = crest & (strength >= found[at - 1][0]) & (strength > found[at + 1][0])
-        area = blurs[at] * float(strength[here & (strength > _FAINTEST)].sum())
-        total += area
-        logarithms += area * log(blurs[at])
-    return _WIDTH * exp(logarithms / total) / shorter if total > 0 else None
+        (below, _), (strength, crest), (above, _) = found[at - 1 : at + 2]
+        here = crest & (strength > _FAINTEST) & (strength >= below) & (strength > above)
+        below, strength, above = below[here], strength[here], above[here]
+        # Between the blurs, where the parabola through the three is highest.
+        beside = (below - above) / (2 * (below - 2 * strength + above))
+        octaves = (at + beside) / _AN_OCTAVE
+        area = strength * 2**octaves
+        total += float(area.sum())
+        logarithms += float((area * octaves).sum())
+    return _WIDTH * _FIRST * 2 ** (logarithms / total) / shorter if total > 0 else None
 
 
 def picture_cells(picture: FloatArray, cells: float, pixels: int) -> float:
@@ -93,7 +97,7 @@ def _ridges(values: AnyArray, blur: float) -> tuple[AnyArray, BoolArray]:
     """How much each pixel of a blurred picture is a ridge, and whether it lies on the crest."""
 
     def derivative(*order: int) -> AnyArray:
-        return gaussian_filter(values, blur, order, mode="nearest")  # pyright: ignore[reportArgumentType]
+        return gaussian_filter(values, blur, order, mode="reflect")  # pyright: ignore[reportArgumentType]
 
     yy, xy, xx = derivative(2, 0), derivative(1, 1), derivative(0, 2)
     middle, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
