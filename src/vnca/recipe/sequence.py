@@ -1,7 +1,7 @@
 <<<<<<< HEAD:src/vnca/cli/sequence.py
 """A sequence of smoke as the commands see it: frames, gaps, box, volumes read ahead."""
 =======
-"""A sequence of smoke in files: its frames, gaps told, its box, volumes read ahead."""
+"""A sequence of smoke in files: its frames, gaps, its box, volumes read ahead."""
 >>>>>>> recipe:src/vnca/recipe/sequence.py
 
 from collections.abc import Iterable, Iterator
@@ -33,7 +33,7 @@ def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
     """The frames of a pattern; gaps and sub-frames are mentioned on standard error.
 =======
 def open_sequence(pattern: str | Path, frames: str | None, watch: Watch) -> FrameSequence:
-    """The frames of a pattern; gaps and sub-frames are told to `watch`.
+    """The frames of a pattern; gaps and sub-frames go to `watch` as notes.
 >>>>>>> recipe:src/vnca/recipe/sequence.py
 
     Raises:
@@ -57,7 +57,7 @@ def read_alone(path: Path, smoke: SmokeFormat) -> Volume:
     """A frame on a lattice of its own; if its voxels are not those cells, a note says so.
 =======
 def read_alone(path: Path, smoke: SmokeFormat, watch: Watch) -> Volume:
-    """A frame on a lattice of its own; if its voxels are not those cells, that is told.
+    """A frame on a lattice of its own; if its voxels are not those cells, a note says so.
 >>>>>>> recipe:src/vnca/recipe/sequence.py
 
     Raises:
@@ -251,8 +251,8 @@ def placed(rule: Rule, region: Region, watch: Watch) -> Rule:
         "the rule is conditioned, are those in the box of this sequence"
 =======
     watch.note(
-        "the smoke lies apart from where the rule was trained, which tells cells their position: "
-        "they are told that in the box of this sequence"
+        "the smoke lies apart from where the rule was trained; positions, on which "
+        "the rule is conditioned, are those in the box of this sequence"
 >>>>>>> recipe:src/vnca/recipe/sequence.py
     )
     return replace(rule, place=None)
