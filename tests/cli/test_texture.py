@@ -252,6 +252,6 @@ def test_help_names_the_subcommands_and_their_options(vnca: Vnca) -> None:
         ("volume", "--block"),
         ("turntable", "--model"),
     ):
-        outcome = vnca("texture", name, "--help")
+        outcome = vnca("texture", name, "--help-all")
         assert outcome.code == 0
         assert option in outcome.out
