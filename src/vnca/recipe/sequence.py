@@ -1,8 +1,4 @@
-<<<<<<< HEAD:src/vnca/cli/sequence.py
-"""A sequence of smoke as the commands see it: frames, gaps, box, volumes read ahead."""
-=======
 """A sequence of smoke in files: its frames, gaps, its box, volumes read ahead."""
->>>>>>> recipe:src/vnca/recipe/sequence.py
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -28,13 +24,8 @@ from vnca.painting.painter import BROKEN
 from vnca.rule.rule import SMOKE_THRESHOLD, Rule, density_scale
 
 
-<<<<<<< HEAD:src/vnca/cli/sequence.py
-def open_sequence(pattern: str, frames: str | None) -> FrameSequence:
-    """The frames of a pattern; gaps and sub-frames are mentioned on standard error.
-=======
 def open_sequence(pattern: str | Path, frames: str | None, watch: Watch) -> FrameSequence:
     """The frames of a pattern; gaps and sub-frames go to `watch` as notes.
->>>>>>> recipe:src/vnca/recipe/sequence.py
 
     Raises:
         SequenceError: If there are none.
@@ -52,13 +43,8 @@ def open_sequence(pattern: str | Path, frames: str | None, watch: Watch) -> Fram
     return sequence
 
 
-<<<<<<< HEAD:src/vnca/cli/sequence.py
-def read_alone(path: Path, smoke: SmokeFormat) -> Volume:
-    """A frame on a lattice of its own; if its voxels are not those cells, a note says so.
-=======
 def read_alone(path: Path, smoke: SmokeFormat, watch: Watch) -> Volume:
     """A frame on a lattice of its own; if its voxels are not those cells, a note says so.
->>>>>>> recipe:src/vnca/recipe/sequence.py
 
     Raises:
         VncaError: If it cannot be read, or can have no place on a lattice.
@@ -245,15 +231,9 @@ def placed(rule: Rule, region: Region, watch: Watch) -> Rule:
     corners = place.cells(ends)
     if (corners.max(axis=0) > lower).all() and (corners.min(axis=0) < upper).all():
         return rule
-<<<<<<< HEAD:src/vnca/cli/sequence.py
-    say(
-        "the smoke lies apart from where the rule was trained; positions, on which "
-        "the rule is conditioned, are those in the box of this sequence"
-=======
     watch.note(
         "the smoke lies apart from where the rule was trained; positions, on which "
         "the rule is conditioned, are those in the box of this sequence"
->>>>>>> recipe:src/vnca/recipe/sequence.py
     )
     return replace(rule, place=None)
 
