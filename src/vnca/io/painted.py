@@ -284,7 +284,7 @@ def _paint_npz(
     colour_grids: Sequence[str],
     told: Mapping[str, Entry],
 ) -> None:
-    stored = read_npz_smoke(source, format)
+    stored = read_npz_smoke(Path(source), format)
     transform = Transform.from_matrix(stored.index_to_world)
     before = stored.density
     density, colour = frame.in_file(transform, before, str(source))
