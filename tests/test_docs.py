@@ -15,6 +15,7 @@ from vnca.cli import COMMANDS, main
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SMOKE = ROOT / "tests" / "data" / "plume_sphere_0030.vdb"
+MODEL = ROOT / "tests" / "data" / "painting" / "rule.safetensors"
 
 
 def blocks() -> Iterator[tuple[str, list[str]]]:
@@ -105,4 +106,7 @@ def test_a_cheap_command_of_the_documentation_runs(
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(SMOKE, path)
+    model = tmp_path / "runs" / "painting" / "model.safetensors"
+    model.parent.mkdir(parents=True)
+    shutil.copy(MODEL, model)
     assert main(words) == 0
