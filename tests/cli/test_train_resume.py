@@ -289,7 +289,7 @@ def test_a_texture_that_is_to_be_overwritten_is_not_taken_for_the_new_one(
     assert vnca("train", frame, style, "--out", whole, *options).code == 0
     assert vnca("train", frame, style, "--out", run, *tiny, "--texture", 1).code == 0
 
-    def stop(*_: object) -> None:
+    def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:

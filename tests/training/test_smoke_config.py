@@ -36,7 +36,7 @@ from vnca.training.smoke_config import PRESETS, SmokeConfig, ViewConfig
 def test_values_that_cannot_work_are_refused_by_the_name_of_their_option(
     config: type, option: str, value: Any
 ) -> None:
-    with pytest.raises(OptionError, match=f"{option.replace('_', '-')}"):
+    with pytest.raises(OptionError, match=option):
         config(**{option: value})
 
 

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from vnca.core.errors import GridError
-from vnca.core.typing import Box, FloatArray, IntArray
+from vnca.core.typing import Box, FloatArray
 from vnca.core.volume import Volume
-from vnca.engine.domain import DomainKind
+from vnca.engine.domain import Domain, DomainKind
 from vnca.features.vgg import VGG16
+from vnca.painting import roll
 from vnca.painting.config import StylizeConfig
-from vnca.painting.roll import stylize
+from vnca.rule.conditioning import priors
+from vnca.rule.rule import Rule
 from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 
@@ -39,15 +41,14 @@ def test_the_frame_of_the_training_has_the_same_priors_in_a_painting(
     higher = dataclasses.replace(here, origin=(x, y, z - shift + 5), frame=2)
     box = reduce(Box.union, (smoke.box for smoke in (here, higher)))
 
-    def step(
-        state: FloatArray, rows: IntArray, neighbours: IntArray, priors: FloatArray
-    ) -> FloatArray:
-        del rows, neighbours
-        told.append(priors)
-        return state
+    def told_priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
+        told.append(priors(domain, smoke, rule))
+        return told[-1]
 
-    frames = stylize([here, higher], trainer.rule(), step, StylizeConfig(warmup=0), box=box)
-    cells = next(frames).state.cells + np.array([0, 0, shift])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(roll, "priors", told_priors)
+        frames = roll.stylize([here, higher], trainer.rule(), StylizeConfig(warmup=0), box=box)
+        cells = next(frames).state.cells + np.array([0, 0, shift])
     rows = {tuple(cell): row for row, cell in enumerate(cells.tolist())}
     ours = [rows[tuple(cell)] for cell in trained.cells.tolist()]
     np.testing.assert_array_equal(told[0][ours], trainer.scene.priors.numpy())
