@@ -60,8 +60,7 @@ class Painter:
         conditions: What else must be the same for a painting to be gone on with: its bytes
             follow from these, the sequence, the rule and nothing else.
         tell: Is given lines for the user.
-        refine: How many times as fine as the smoke's the grid of the painting is; what the roll
-            paints is refined smoke.
+        refine: How many times as fine as the smoke's the grid of the painting is.
         facts: What else files tell of their painting, beside how opaque it is to be seen.
     """
 
@@ -175,7 +174,7 @@ class Painter:
             self.smoke,
             density=painting.density_field,
             colour=painting.colour_field,
-            box=read.smoke.box,
+            box=painting.smoke.box,
             lattice=self.lattice,
             colour_grids=self.colour_grids,
             refine=self.refine,
@@ -201,7 +200,7 @@ class Painter:
         scales = self.roll.rule.scales
         return Provenance(
             scales.extinction(read.smoke.cell_length),
-            scales.gamma * self.refine,
+            scales.gamma * self.roll.grid,
             up_axis_of(read.frame.path, self.smoke),
             self.facts,
         )
@@ -213,7 +212,7 @@ class Painter:
             status = existing_file(frame.path).stat()
             smoke = read_smoke(
                 frame.path, self.smoke, frame=frame.number, lattice=self.lattice
-            ).refined(self.refine)
+            ).refined(self.roll.grid)
         except BROKEN as error:
             return error
         except OSError as error:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import vnca
 from vnca.bench.machine import run_facts
@@ -60,8 +60,8 @@ class EvaluateRun:
     style_scale: float | None = None
     """Shorter side of the picture relative to the views; as many cells as in the training unless
     given."""
-    refine: Literal[1, 2, 3, 4] = 1
-    """Paint on a grid so many times as fine as that of the smoke."""
+    refine: int = 1
+    """Paint on a grid so many times as fine as that of the smoke, at most 8."""
     size: int = SIZE
     """Rows and columns of the views, pixels."""
     backend: str = "auto"
@@ -120,7 +120,7 @@ def evaluate(
     out: str | Path | None = None,
     frames: str | None = None,
     style_scale: float | None = None,
-    refine: Literal[1, 2, 3, 4] = 1,
+    refine: int = 1,
     size: int = SIZE,
     backend: str = "auto",
     watch: Watch = SILENT,
@@ -229,7 +229,8 @@ def run(
     )
     paintings = tracked(paintings, watch, "painting and measuring", given.count, "frames")
     judges = _judges(model, metric, options.size)
-    found = survey(paintings, given.count, rule.refined(refine), setup, metric, judges)
+    cells = 1 if rule.decoder is not None else refine
+    found = survey(paintings, given.count, rule.refined(cells), setup, metric, judges)
     listed = measures(found)
     watch.note(f"trained with features '{model.training.get('features', 'unknown')}'")
     if out is None:

@@ -6,7 +6,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
@@ -74,7 +74,7 @@ def stylize(
     *,
     out: str | Path | None = None,
     frames: str | None = None,
-    refine: Literal[1, 2, 3, 4] = 1,
+    refine: int = 1,
     colour_grid: str | Sequence[str] = "Cd",
     preview: str | Path | None = None,
     gamma: float | None = None,

@@ -40,8 +40,9 @@ def pretraining_config(config: SmokeConfig, share: float, picture: float) -> Tex
         appearance=dataclasses.replace(
             plain.appearance,
             layers=config.appearance.layers,
-            style_scale=picture / plain.slices.size,
+            style_scale=picture / plain.slices.cells,
         ),
+        decoder=config.decoder,
         iterations=iterations,
         features=config.features,
         backend=config.backend,

@@ -18,6 +18,12 @@ class ViewConfig:
 
     size: int = 128
     """Rows and columns of a view, pixels."""
+    pixels_per_cell: float | None = None
+    """Pixels that show a cell: a view then shows a part of the smoke, from as near as that takes;
+    all of the smoke unless given."""
+    supersampling: int = 2
+    """Rays along the rows and the columns of a pixel, where a decoder draws what is finer than
+    pixels."""
     azimuths: tuple[float, ...] = ()
     """Views come from these degrees around the smoke; from all around unless given."""
     elevation: float = 30.0
@@ -36,6 +42,12 @@ class ViewConfig:
     def __post_init__(self) -> None:
         if self.size < 32:
             raise OptionError(f"`view.size` {self.size}: at least 32 pixels are needed")
+        if self.pixels_per_cell is not None and not 0 < self.pixels_per_cell <= 64:
+            raise OptionError(
+                f"`view.pixels_per_cell` {self.pixels_per_cell:g}: must be above 0, at most 64"
+            )
+        if not 1 <= self.supersampling <= 8:
+            raise OptionError(f"`view.supersampling` {self.supersampling}: must be from 1 to 8")
         if not all(-360 <= azimuth <= 360 for azimuth in self.azimuths):
             raise OptionError(
                 f"`view.azimuths` {' '.join(map(str, self.azimuths))}: must be -360 to 360 degrees"
@@ -71,11 +83,10 @@ class SmokeConfig(TrainingConfig):
 # gradients let patterns hold their shape.
 _ANYWHERE = RuleConfig(sobel_divisor=8, position_prior=False)
 
-# About a pixel a cell: of finer detail comes grain.
 _DRAFT = SmokeConfig(
     iterations=250,
     learning_rate=1e-3,
-    view=ViewConfig(size=96),
+    view=ViewConfig(size=128, pixels_per_cell=4.0),
     pool=PoolConfig(size=16),
     rule=_ANYWHERE,
     appearance=AppearanceConfig(grey=False, samples=512),
@@ -99,6 +110,7 @@ PRESETS = {
         view=ViewConfig(size=256, elevation=0.0, mode="paper"),
         pool=PoolConfig(size=256),
         rule=RuleConfig(hidden=128),
+        decoder=0,
         appearance=AppearanceConfig(pixels=0.0, style_scale=1.0),
         features="vgg16",
     ),
