@@ -19,7 +19,6 @@ from vnca.io.orientation import UpAxis
 from vnca.io.picture import to_srgb8
 from vnca.meshes.bake import Placement, bake, to_png
 from vnca.meshes.unwrap import Unwrap, unwrapped
-from vnca.painting.block import sample_block
 from vnca.rule.rule import Rule
 
 SUFFIXES = (".glb", ".ply")
@@ -111,7 +110,7 @@ def _bake(options: Bake, rule: Rule, mesh: Mesh, place: Placement) -> None:
 
 def _colour_vertices(options: Bake, rule: Rule, mesh: Mesh, place: Placement) -> None:
     (block,) = grown_blocks(rule, options.grow)
-    colours = [to_srgb8(sample_block(block, place(s.points))) for s in mesh.surfaces]
+    colours = [to_srgb8(block.at(place(s.points))) for s in mesh.surfaces]
     write_coloured(options.out, mesh, colours)
 
 

@@ -8,9 +8,8 @@ from pathlib import Path
 from vnca.cli.options import say
 from vnca.cli.progress import Progress
 from vnca.core.errors import OptionError
-from vnca.core.typing import FloatArray
 from vnca.engine.session import Compute
-from vnca.painting.block import KIND, LARGEST, SMALLEST, grow
+from vnca.painting.block import KIND, LARGEST, SMALLEST, Block, grow
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule
 
@@ -52,8 +51,8 @@ def texture_rule(path: Path) -> Rule:
     return model.rule
 
 
-def grown_blocks(rule: Rule, config: BlockConfig, count: int = 1) -> Iterator[FloatArray]:
-    """`count` blocks, linear RGB `[s, s, s, 3]`: the first grown from nothing, and its later life.
+def grown_blocks(rule: Rule, config: BlockConfig, count: int = 1) -> Iterator[Block]:
+    """`count` blocks: the first grown from nothing, and its later life.
 
     Raises:
         BackendUnavailableError: If the kernel cannot run.

@@ -15,6 +15,7 @@ from vnca.core.errors import OptionError
 from vnca.core.files import whole_file, writable_file
 from vnca.core.typing import FloatArray
 from vnca.io.vdb import Grid, Transform, write_vdb
+from vnca.painting.parts import require_refinement
 
 SUFFIXES = (".vdb", ".npz")
 
@@ -27,12 +28,15 @@ class Volume:
     """A model file, or the folder of a training run."""
     out: Path
     """A .vdb file with `density` 1 and `Cd`, a unit wide; or an .npz file with `Cd`."""
+    refine: int = 1
+    """Write a grid so many times as fine as the block's cells, at most 8."""
     grow: Annotated[BlockConfig, tyro.conf.arg(name="")] = field(default_factory=BlockConfig)
     """How the block is grown."""
 
     def __post_init__(self) -> None:
         if self.out.suffix.lower() not in SUFFIXES:
             raise OptionError(f"--out {self.out}: expected a name ending in .vdb or .npz")
+        require_refinement(self.refine)
 
 
 def run(arguments: Sequence[str]) -> None:
@@ -41,7 +45,7 @@ def run(arguments: Sequence[str]) -> None:
     writable_file(options.out)
     (block,) = grown_blocks(texture_rule(options.model), options.grow)
     write = _write_vdb if options.out.suffix.lower() == ".vdb" else _write_npz
-    write(options.out, block)
+    write(options.out, block.refined(options.refine))
     made("block", options.out)
 
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from vnca.core.bricks.dense import dense, field_of
 from vnca.core.bricks.field import Field
-from vnca.core.errors import OptionError
 from vnca.core.typing import Box, FloatArray, IntArray
 from vnca.core.volume import Volume
 from vnca.engine.backend import open_session
@@ -25,6 +24,7 @@ from vnca.engine.session import Compute
 from vnca.io.orientation import on_one_lattice
 from vnca.io.velocity import extrapolated
 from vnca.painting.config import StylizeConfig
+from vnca.painting.parts import colour_means, density_means, parts_of_cells
 from vnca.rule.conditioning import priors
 from vnca.rule.paint import Between, colours, density_factors
 from vnca.rule.rule import SMOKE_THRESHOLD, Rule
@@ -34,12 +34,6 @@ UNPAINTED = 1.0
 COLOUR_DILATION = 3
 """How many cells beyond the living ones their colour goes on, so that faint smoke is no pale seam
 where a renderer interpolates it."""
-
-
-SAMPLES = {1: 3, 2: 2, 3: 2, 4: 2, 5: 1, 6: 1, 7: 1, 8: 1}
-"""Points along each axis at which a decoder is asked for a cell of a painting, by how many times as
-fine as the automaton's grid it is."""
-_POINTS_AT_ONCE = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,19 +216,12 @@ class Roll:
             cells = state.values[:-1]
             return state.cells, colours(cells), density_factors(cells, strength=strength)
         between = Between(self.rule, self.compute.backend, threads=self.compute.threads)
-        parts, along = self.finer, self.finer * SAMPLES[self.finer]
-        split = 3 * (parts, along // parts)
+        parts = self.finer
         colour = np.empty((len(domain), *3 * (parts,), 3), np.float32)
         factors = np.empty(colour.shape[:-1], np.float32)
-        at_once = max(1, _POINTS_AT_ONCE // along**3)
-        for start in range(0, len(domain), at_once):
-            some = slice(start, start + at_once)
-            rows = np.arange(start, min(start + at_once, len(domain)), dtype=np.int32)
-            seen = between.in_cells(state.values, rows, domain.neighbours, along)
-            shown = colours(seen).reshape(-1, *split, 3)
-            changed = density_factors(seen, strength=strength).reshape(-1, *split)
-            colour[some] = shown.mean((2, 4, 6))
-            factors[some] = changed.mean((2, 4, 6))
+        for some, seen in parts_of_cells(between, state.values, domain, parts):
+            colour[some] = colour_means(seen)
+            factors[some] = density_means(seen, strength=strength)
         offsets = np.indices(3 * (parts,), np.int32).reshape(3, -1).T
         at = (state.cells[:, None] * parts + offsets).reshape(-1, 3)
         return at.astype(np.int32, copy=False), colour.reshape(-1, 3), factors.reshape(-1)
@@ -253,12 +240,6 @@ class Roll:
     @cached_property
     def _whole_box(self) -> Domain:
         return Domain.filling(self.box.grown(self.rule.config.reach))
-
-
-def require_refinement(factor: int) -> None:
-    """Raise `OptionError` unless paintings can be so many times as fine as the smoke."""
-    if factor not in SAMPLES:
-        raise OptionError(f"`refine` {factor}: must be from 1 to {max(SAMPLES)}")
 
 
 def stylize(

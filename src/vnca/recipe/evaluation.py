@@ -29,6 +29,7 @@ from vnca.metrics.setup import SIZE, Setup
 from vnca.metrics.style import SMALLEST, StyleMetric
 from vnca.metrics.survey import Survey, survey
 from vnca.painting.config import StylizeConfig
+from vnca.painting.parts import require_refinement
 from vnca.painting.roll import stylize
 from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY, PICTURE_CELLS, loaded, recorded_smoke
@@ -73,6 +74,7 @@ class EvaluateRun:
 
     def __post_init__(self) -> None:
         Compute(self.backend)
+        require_refinement(self.refine)
         if self.size < 64:
             raise OptionError(f"`size` {self.size}: at least 64 pixels are needed")
         if self.style_scale is not None:

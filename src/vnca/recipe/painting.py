@@ -23,7 +23,8 @@ from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import OnError, Painter
-from vnca.painting.roll import Roll, require_refinement
+from vnca.painting.parts import require_refinement
+from vnca.painting.roll import Roll
 from vnca.recipe.film import Film, FilmConfig, Shown
 from vnca.recipe.sequence import (
     open_sequence,

@@ -80,10 +80,10 @@ def render(
     Differentiable in `density` and `colour`, except for cells further than a cell from any
     smoke: rays are not sampled there. Deterministic bit for bit on the CPU.
 
-    Colours of an array: density and density times colour are interpolated, and the colour of a sample is their
-    quotient: so what colour the empty cells around the smoke have is of no effect. A shader says
-    what is at each sample that can be seen, however fine; the density is then that of the smoke
-    before it is painted.
+    Colours of an array: density and density times colour are interpolated, and the colour of a
+    sample is their quotient: so what colour the empty cells around the smoke have is of no effect.
+    A shader says what is at each sample that can be seen, however fine; the density is then that
+    of the smoke before it is painted.
 
     Lengths are those of the space the camera is in, whatever the shape of the cells: what a slab
     of smoke absorbs depends on how thick it is there, not on how many cells it is divided into.

@@ -86,6 +86,11 @@ class Decoder:
         return self.weights.first.shape[1]
 
     @property
+    def units(self) -> int:
+        """Of each of its layers."""
+        return self.weights.first.shape[0]
+
+    @property
     def weight_count(self) -> int:
         """Number of trained weights."""
         return sum(array.size for array in self.weights)
