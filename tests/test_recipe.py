@@ -185,7 +185,7 @@ def test_who_stops_asking_can_resume_too(cache: Path, model: Path, tmp_path: Pat
         ),
         ({"view": {"siz": 32}}, "`view.siz`: no such .*`view.size`"),
         ({"view": {"size": 3}}, "`view.size` 3"),
-        ({"preset": "best"}, "`preset` 'best': expected one of draft, standard, paper"),
+        ({"preset": "best"}, "`preset` best: expected one of draft, paper, standard"),
         ({"resume": True}, "`resume`: needs the folder"),
         ({"texture": -1}, "`texture` -1"),
         ({"iterations": "many"}, "`iterations` 'many'"),
@@ -226,7 +226,7 @@ def test_what_needs_files_says_so(tiny_smoke: Volume, model: Path, tmp_path: Pat
 def test_a_texture_is_trained_in_memory(picture: Path) -> None:
     tiny = {name: value for name, value in TINY.items() if name not in ("view", "rule")}
     rule = {"channels": 6, "hidden": 8}
-    model = vnca.texture(read_image(picture), block=16, rule=rule, slices={"size": 32}, **tiny)
+    model = vnca.texture(read_image(picture), block=16, rule=rule, slice={"size": 32}, **tiny)
     assert model.training["kind"] == "texture"
     assert model.rule.config.hidden == 8
 

@@ -52,7 +52,7 @@ def films_of(picture: Path, work: Path) -> None:
     name = picture.stem
     write_image(FILMS / f"{name}.webp", fit(read_image(picture), THUMBNAIL, THUMBNAIL))
     run = work / f"smoke_{name}"
-    how = ("--begin-with", texture_of(picture, work), *TRAINING)
+    how = ("--init", texture_of(picture, work), *TRAINING)
     made(run / "model.safetensors", "train", work / "plume" / TRAINED, picture, "--out", run, *how)
     for scene, (_, frames) in SCENES.items():
         painted, film = work / f"{name}_{scene}", FILMS / f"{name}_{scene}.webp"

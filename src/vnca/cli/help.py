@@ -1,6 +1,5 @@
 """What `--help` and `--help-all` print: the options of a dataclass, all or those asked for most."""
 
-import ast
 import dataclasses
 import inspect
 import re
@@ -13,6 +12,8 @@ from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import tyro
+
+from vnca.core.records import field_texts
 
 SHORT = {
     "-o": "--out",
@@ -49,6 +50,9 @@ COMMON: Mapping[str, tuple[str, ...]] = {
 }
 """The options that `--help` shows of a command, in its order; of others it shows all."""
 JSON_PROGRESS = "--json-progress"
+NAMES = {"config": "", "rule": "", "smoke": "", "grow": ""}
+"""What options of fields are called where it is not as the field; empty for a dataclass whose
+fields are options as if they were of the one around it."""
 _COLUMN = 26
 _WIDTHS = (60, 100)
 
@@ -171,44 +175,59 @@ def _meant(option: Option, names: Collection[str]) -> str:
 def _options(
     kind: type, default: Any, prefix: str = "", group: str = "", separator: str = " "
 ) -> Iterator[Option]:
-    hints, texts = get_type_hints(kind, include_extras=True), _texts(kind)
+    hints, texts = get_type_hints(kind, include_extras=True), field_texts(kind)
     for field in dataclasses.fields(kind):
         hint: Any = hints[field.name]
         marks: tuple[Any, ...] = ()
         if get_origin(hint) is Annotated:
             hint, *rest = get_args(hint)
             marks = tuple(rest)
-        value = _value(field, default)
-        named = next((n for n in (getattr(m, "name", None) for m in marks) if n is not None), None)
+        value = default_of(field, default)
+        named = option_name(kind, field.name)
         name = prefix + (field.name.replace("_", "-") if named is None else named)
         if dataclasses.is_dataclass(hint) and isinstance(hint, type):
             inside = f"{name}." if named != "" else prefix
             title = (inspect.getdoc(hint) or "").partition("\n\n")[0]
             yield from _options(hint, value, inside, title, separator)
             continue
-        is_missing = value is dataclasses.MISSING or value is tyro.MISSING
+        is_required = _is_missing(value)
         metavar = next((m.metavar for m in marks if getattr(m, "metavar", None)), None)
         yield Option(
             name,
             group,
             "" if hint is bool else metavar or _form(hint, separator),
             " ".join(texts.get(field.name, "").split()),
-            "" if is_missing else _written(value, separator),
+            "" if is_required else _written(value, separator),
             is_positional=any(mark is _POSITIONAL for mark in marks),
-            is_required=is_missing,
+            is_required=is_required,
             is_flag=hint is bool,
         )
 
 
+_MISSING = (dataclasses.MISSING, tyro.MISSING, tyro.MISSING_NONPROP)
 _POSITIONAL: Any = list(get_args(tyro.conf.Positional[int]))[1]
 
 
-def _value(field: "dataclasses.Field[Any]", default: Any) -> Any:
-    if default not in (None, dataclasses.MISSING, tyro.MISSING):
-        return getattr(default, field.name)
+def option_name(kind: type, field: str) -> str | None:
+    """What the option of a field is called where it is not called like the field.
+
+    Empty for a dataclass whose own fields are options as if they were of the one around it.
+    """
+    return NAMES.get(field)
+
+
+def _is_missing(value: Any) -> bool:
+    """Whether a default says that there is none."""
+    return any(value is one for one in _MISSING)
+
+
+def default_of(field: "dataclasses.Field[Any]", instance: Any) -> Any:
+    """The value of a field that is not given: that of an instance, or else the field's own."""
+    if instance is not None and not _is_missing(instance):
+        return getattr(instance, field.name)
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
-    return field.default
+    return tyro.MISSING if field.default is dataclasses.MISSING else field.default
 
 
 def _form(hint: Any, separator: str) -> str:
@@ -243,25 +262,3 @@ def _written(value: Any, separator: str) -> str:
 
 def _is_grid(value: tuple[Any, ...]) -> bool:
     return len(value) == 3 and all(type(one) is int for one in value)
-
-
-def _texts(kind: type) -> dict[str, str]:
-    """The string under each field of a dataclass, and of those that it is made of, by name."""
-    found: dict[str, str] = {}
-    for one in reversed(kind.__mro__):
-        if not dataclasses.is_dataclass(one):
-            continue
-        try:
-            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(one))).body
-        except (OSError, TypeError):  # installed without its source
-            continue
-        assert isinstance(tree, ast.ClassDef)
-        for field, text in zip(tree.body, tree.body[1:], strict=False):
-            if (
-                isinstance(field, ast.AnnAssign)
-                and isinstance(field.target, ast.Name)
-                and isinstance(text, ast.Expr)
-                and isinstance(text.value, ast.Constant)
-            ):
-                found[field.target.id] = str(text.value.value)
-    return found

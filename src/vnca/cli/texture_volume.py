@@ -27,7 +27,7 @@ class Volume:
     """A model file, or the folder of a training run."""
     out: Path
     """A .vdb file with `density` 1 and `Cd`, a unit wide; or an .npz file with `Cd`."""
-    grow: Annotated[BlockConfig, tyro.conf.arg(name="")] = field(default_factory=BlockConfig)
+    grow: BlockConfig = field(default_factory=BlockConfig)
     """How the block is grown."""
 
     def __post_init__(self) -> None:

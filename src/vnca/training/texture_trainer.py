@@ -39,7 +39,7 @@ def texture_trainer(
     Raises:
         OptionError: If the memory budget is not enough.
     """
-    scene = BlockScene(config.block, config.slices, mesh=mesh, device=device)
+    scene = BlockScene(config.block, config.slice, mesh=mesh, device=device)
     rule = initial_rule(config)
     return Trainer(scene, rule, style, config, network, memory_budget=memory_budget)
 
