@@ -131,6 +131,9 @@ def test_memory_and_files_give_the_same(cache: Path, picture: Path, tmp_path: Pa
     view = {"rows": 32, "columns": 32}
     vnca.render(tmp_path / "out", tmp_path / "a_####.png", film=view)
     vnca.render(kept, tmp_path / "b_####.png", film=view)
+    for idle in ({"gamma": 2.0}, {"strip": 1}, {"colour_grid": "color"}, {"up_axis": "y"}):
+        with pytest.raises(vnca.VncaError, match=f"`{next(iter(idle))}`: needs a sequence"):
+            vnca.render(kept, tmp_path / "c_####.png", **idle)
     for number in (1, 2):
         one, other = (read_image(tmp_path / f"{kind}_000{number}.png") for kind in "ab")
         np.testing.assert_allclose(one, other, atol=2 / 255)

@@ -28,7 +28,7 @@ TRAINING = (
 PAINTINGS = ("vangogh_church_auvers", "vangogh_harvest")
 THUMBNAIL = 200
 """Rows and columns of the picture beside its films."""
-FILM = ("--film.rows", 200, "--film.columns", 200, "--film.fps", 12, "--film.background", "#3c3c42")
+FILM = ("--rows", 200, "--columns", 200, "--film-fps", 12, "--background", "#3c3c42")
 
 
 def main(folder: str) -> None:

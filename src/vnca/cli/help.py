@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 import tyro
 
 from vnca.core.records import field_texts
+from vnca.core.shot import Shot
 
 SHORT = {
     "-o": "--out",
@@ -27,7 +28,7 @@ SHORT = {
 ASKED = ("-h", "--help", "--help-all")
 """What asks for help."""
 _SMOKE = ("velocity-units", "fps", "up-axis")
-_FILM = ("film.azimuth", "film.elevation", "film.turn", "film.rows", "film.columns", "film.fps")
+_FILM = ("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background")
 COMMON: Mapping[str, tuple[str, ...]] = {
     "train": (
         *("out", "preset", "iterations", "view.size", "seed", "texture", *_SMOKE),
@@ -35,14 +36,11 @@ COMMON: Mapping[str, tuple[str, ...]] = {
     ),
     "stylize": (
         *("out", "frames", "refine", "preview", "strength", "density-strength", "gamma", "seed"),
-        *("resume", "on-error", *_SMOKE),
+        *("resume", "overwrite", "on-error", *_SMOKE),
     ),
     "evaluate": ("out", "frames", "refine", "style", "size", "json"),
     "ablate": ("out", "preset", "seeds", "iterations", "json", "device", *_SMOKE),
-    "render": (
-        *("out", "frames", "turntable", "strip", "transparent", "gamma"),
-        *(*_FILM, "film.background"),
-    ),
+    "render": (*("out", "frames", "turntable", "strip", "transparent", "gamma", *_FILM),),
     "texture train": ("out", "preset", "iterations", "seed", "mesh", "device", "overwrite"),
     "bench step": ("backends", "threads", "json", "csv"),
     "bench train": ("preset", "backends", "device", "threads", "repeats", "json", "csv"),
@@ -50,9 +48,11 @@ COMMON: Mapping[str, tuple[str, ...]] = {
 }
 """The options that `--help` shows of a command, in its order; of others it shows all."""
 JSON_PROGRESS = "--json-progress"
-NAMES = {"config": "", "rule": "", "smoke": "", "grow": ""}
+NAMES = dict.fromkeys(("config", "rule", "smoke", "grow", "film"), "")
 """What options of fields are called where it is not as the field; empty for a dataclass whose
 fields are options as if they were of the one around it."""
+SHOT_NAMES = {"fps": "film-fps", "step": "ray-step"}
+"""Likewise of how a film is taken: `--fps` is the simulation's."""
 _COLUMN = 26
 _WIDTHS = (60, 100)
 
@@ -62,7 +62,7 @@ class Option:
     """An option or a positional argument.
 
     Attributes:
-        name: Without dashes: `film.fps`.
+        name: Without dashes: `view.size`.
         group: What it belongs to, a sentence; empty for the command itself.
         form: What follows it: `{1,2,3,4}`; empty for a flag.
         text: What it does.
@@ -213,7 +213,15 @@ def option_name(kind: type, field: str) -> str | None:
 
     Empty for a dataclass whose own fields are options as if they were of the one around it.
     """
-    return NAMES.get(field)
+    return (SHOT_NAMES if issubclass(kind, Shot) else NAMES).get(field)
+
+
+def as_option(argument: str) -> str:
+    """The option of an argument as the library names it: `--view.size` of `view.size`."""
+    name = argument.removeprefix("film.")
+    if name != argument:
+        name = SHOT_NAMES.get(name, name)
+    return "--" + name.replace("_", "-")
 
 
 def _is_missing(value: Any) -> bool:

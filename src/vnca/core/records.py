@@ -124,11 +124,8 @@ def _wanted(hint: Any) -> str:
     if origin in (Union, UnionType):
         return " or ".join(_wanted(one) for one in inside if one is not NoneType)
     if origin is Literal:
-        return (
-            " or ".join(map(str, inside))
-            if len(inside) < 3
-            else f"one of {', '.join(map(str, inside))}"
-        )
+        choices = [*map(str, inside)]
+        return " or ".join(choices) if len(choices) < 3 else f"one of {', '.join(choices)}"
     if origin is tuple:
         return f"a list, each {_wanted(inside[0])}"
     if dataclasses.is_dataclass(hint):
