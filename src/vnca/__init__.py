@@ -39,7 +39,8 @@ if TYPE_CHECKING:
     from vnca.rule.rule import Rule, RuleConfig, Scales
     from vnca.simulation.scenes import simulate as simulate_smoke
     from vnca.training.loop import Trainer
-    from vnca.training.smoke_config import PRESETS, SmokeConfig
+    from vnca.training.presets import preset
+    from vnca.training.smoke_config import SmokeConfig
     from vnca.training.smoke_trainer import smoke_trainer
     from vnca.training.texture_config import TextureConfig
 
@@ -64,7 +65,6 @@ _HOMES = {
     "Lattice": "core.lattice",
     "Model": "rule.model",
     "Orthographic": "core.camera",
-    "PRESETS": "training.smoke_config",
     "Painting": "painting.roll",
     "Perspective": "core.camera",
     "Rule": "rule.rule",
@@ -81,6 +81,7 @@ _HOMES = {
     "frame_box": "core.camera",
     "load_network": "features.load",
     "open_vdb": "io.vdb",
+    "preset": "training.presets",
     "read_image": "io.picture",
     "read_smoke": "io.smoke",
     "render_view": "rendering.view:render",
@@ -95,7 +96,6 @@ _HOMES = {
 }
 
 __all__ = [
-    "PRESETS",
     "Box",
     "Cancelled",
     "Evaluation",
@@ -125,6 +125,7 @@ __all__ = [
     "load",
     "load_network",
     "open_vdb",
+    "preset",
     "read_image",
     "read_smoke",
     "render",

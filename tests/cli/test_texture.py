@@ -60,7 +60,7 @@ def test_a_run_leaves_a_model_that_bakes(
     assert not model.rule.config.density_prior
     assert model.style is not None
     config = json.loads((run / "config.json").read_text())["config"]
-    assert config["slices"]["size"] == 32
+    assert config["slice"]["size"] == 32
     assert (run / "preview_000002.png").exists()
     outcome = vnca("texture", "bake", run, mesh, "--out", tmp_path / "a.glb", *SMALL, "--size", 64)
     assert outcome.code == 0, outcome.err

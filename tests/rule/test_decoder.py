@@ -37,9 +37,6 @@ def test_a_higher_frequency_draws_finer_contours() -> None:
             decoder = Decoder.initial(12, seed=seed, frequency=frequency)
             seen = Between(replace(rule, decoder=decoder)).at(state, rows, fractions)
             added = (seen - plain)[:, :3]
-                Between(replace(rule, decoder=decoder)).at(state, rows, fractions)[:, :3]
-                - plain[:, :3]
-            )
             slope = np.diff(added.astype(np.float64), axis=0)
             total += int((slope[1:] * slope[:-1] < 0).sum())
         return total

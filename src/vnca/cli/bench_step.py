@@ -2,9 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
-
-import tyro
 
 from vnca.bench.step import TOLERANCES, StepConfig, StepRun, measure_steps, prepare
 from vnca.cli.bench_options import Tables, parse_bench, short
@@ -18,7 +15,7 @@ class Step(Tables):
     every backend. If backends disagree with the reference in float64, nothing is timed.
     """
 
-    config: Annotated[StepConfig, tyro.conf.arg(name="")] = field(default_factory=StepConfig)
+    config: StepConfig = field(default_factory=StepConfig)
     """What is measured."""
 
 

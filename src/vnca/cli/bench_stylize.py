@@ -4,9 +4,6 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
-
-import tyro
 
 from vnca.bench.machine import run_facts
 from vnca.bench.stylize import (
@@ -59,7 +56,7 @@ class BenchStylize(Tables):
     """Of the native kernel; as many as there are cores unless given."""
     repeats: int = 3
     """How often the sequence is painted by each backend, in turns."""
-    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
 
     def __post_init__(self) -> None:

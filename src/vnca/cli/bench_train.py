@@ -4,10 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Annotated, Literal
 
 import torch
-import tyro
 
 from vnca.bench.contenders import available, require
 from vnca.bench.machine import run_facts
@@ -27,7 +25,8 @@ from vnca.recipe.sequence import beside, read_alone
 from vnca.recipe.session import choose_device
 from vnca.simulation.scenes import simulate
 from vnca.training.memory import memory_budget
-from vnca.training.smoke_config import PRESETS, SmokeConfig
+from vnca.training.presets import DEFAULT, preset
+from vnca.training.smoke_config import SmokeConfig
 
 _FRAME = 30
 """Of the simulated plume: it has risen through most of its box."""
@@ -47,8 +46,8 @@ class BenchTrain(Tables):
     """A picture; one of the package unless given."""
     resolution: int = 48
     """Cells across the simulated plume."""
-    preset: Literal["draft", "standard", "paper"] = "draft"
-    """Sizes of what is trained."""
+    preset: str = DEFAULT
+    """Sizes of what is trained: draft, standard, paper, or a TOML file."""
     hidden: int | None = None
     """Hidden units; the preset's unless given."""
     rollout: int | None = None
@@ -65,7 +64,7 @@ class BenchTrain(Tables):
     """Of the CPU; as many as it has cores unless given."""
     repeats: int = 5
     """Iterations that are timed."""
-    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
 
     def __post_init__(self) -> None:
@@ -78,12 +77,12 @@ class BenchTrain(Tables):
     @property
     def config(self) -> SmokeConfig:
         """The hyperparameters."""
-        preset = PRESETS[self.preset]
-        rollout = self.rollout or (preset.shortest_rollout + preset.longest_rollout) // 2
+        plan = preset(SmokeConfig, self.preset)
+        rollout = self.rollout or (plan.shortest_rollout + plan.longest_rollout) // 2
         return replace(
-            preset,
-            rule=replace(preset.rule, hidden=self.hidden or preset.rule.hidden),
-            view=replace(preset.view, size=self.view_size or preset.view.size),
+            plan,
+            rule=replace(plan.rule, hidden=self.hidden or plan.rule.hidden),
+            view=replace(plan.view, size=self.view_size or plan.view.size),
             shortest_rollout=rollout,
             longest_rollout=rollout,
         )

@@ -1,5 +1,6 @@
 """From dataclasses to options: the one place that knows how a command line is read."""
 
+import dataclasses
 import io
 import json
 import re
@@ -8,17 +9,40 @@ from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Annotated, Any, TypeVar, cast, get_type_hints
 
 import tyro
+from tyro.constructors import (
+    ConstructorRegistry,
+    StructConstructorSpec,
+    StructFieldSpec,
+    StructTypeInfo,
+)
 
-from vnca.cli.help import ASKED, SHORT, help_text
+from vnca.cli.help import ASKED, SHORT, default_of, help_text, option_name
 from vnca.cli.progress import as_options, end_line
 from vnca.core.errors import OptionError
 
 T = TypeVar("T")
 STDOUT = Path("-")
 """Where `--json -` writes."""
+_RULES = ConstructorRegistry()
+
+
+@_RULES.struct_rule
+def _dataclass(asked: StructTypeInfo) -> StructConstructorSpec | None:
+    """Options of a dataclass, named as `option_name` has it: dataclasses know nothing of them."""
+    if not dataclasses.is_dataclass(asked.type):
+        return None
+    hints = get_type_hints(asked.type, include_extras=True)
+    fields = []
+    for field in dataclasses.fields(asked.type):
+        hint = hints[field.name]
+        if (name := option_name(asked.type, field.name)) is not None:
+            hint = Annotated[hint, tyro.conf.arg(name=name)]
+        default = default_of(field, asked.default)
+        fields.append(StructFieldSpec(field.name, hint, default))
+    return StructConstructorSpec(asked.type, tuple(fields))
 
 
 def parse(
@@ -56,7 +80,7 @@ def parse(
         raise SystemExit(0)
     complaint = io.StringIO()
     try:
-        with redirect_stderr(complaint):
+        with redirect_stderr(complaint), _RULES:
             return tyro.cli(options, prog=f"vnca {command}", args=list(arguments), **keywords)
     except SystemExit:
         what = _in_one_line(complaint.getvalue())

@@ -10,6 +10,8 @@ from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
 from typing import Any, TextIO, TypeVar
 
+from vnca.cli.help import as_option
+
 T = TypeVar("T")
 _ARGUMENT = re.compile(r"`([a-z_]+(?:\.[a-z_]+)*)`")
 
@@ -85,7 +87,7 @@ def made(what: str, path: Path) -> None:
 
 def as_options(text: str) -> str:
     """What the library says of arguments, such as `view.size`, in the words of the command line."""
-    return _ARGUMENT.sub(lambda found: "--" + found[1].replace("_", "-"), text)
+    return _ARGUMENT.sub(lambda found: as_option(found[1]), text)
 
 
 def end_line() -> None:

@@ -46,7 +46,7 @@ class Bake:
     """Make UVs: auto keeps those there where they can be used, never insists on them."""
     up_axis: UpAxis | None = None
     """The mesh's up axis; y for OBJ and GLB, z for PLY and STL unless given."""
-    grow: Annotated[BlockConfig, tyro.conf.arg(name="")] = field(default_factory=BlockConfig)
+    grow: BlockConfig = field(default_factory=BlockConfig)
     """How the block is grown."""
 
     def __post_init__(self) -> None:

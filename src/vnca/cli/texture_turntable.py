@@ -37,11 +37,9 @@ class TurntableOptions:
     """With --model: how often the block repeats along the longest side of the mesh."""
     up_axis: UpAxis | None = None
     """The mesh's up axis; y for OBJ and GLB, z for PLY and STL unless given."""
-    film: Annotated[TurntableConfig, tyro.conf.arg(name="")] = field(
-        default_factory=TurntableConfig
-    )
+    film: TurntableConfig = field(default_factory=TurntableConfig)
     """How it is filmed."""
-    grow: Annotated[BlockConfig, tyro.conf.arg(name="")] = field(default_factory=BlockConfig)
+    grow: BlockConfig = field(default_factory=BlockConfig)
     """With --model: how the block is grown. 0 steps a frame for a texture that stands still."""
 
     def __post_init__(self) -> None:

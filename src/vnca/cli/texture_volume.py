@@ -30,7 +30,7 @@ class Volume:
     """A .vdb file with `density` 1 and `Cd`, a unit wide; or an .npz file with `Cd`."""
     refine: int = 1
     """Write a grid so many times as fine as the block's cells, at most 8."""
-    grow: Annotated[BlockConfig, tyro.conf.arg(name="")] = field(default_factory=BlockConfig)
+    grow: BlockConfig = field(default_factory=BlockConfig)
     """How the block is grown."""
 
     def __post_init__(self) -> None:

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 
 from vnca.core.camera import Orthographic, view_axes
 from vnca.core.errors import OptionError
+from vnca.core.shot import Shot, parse_colour
 from vnca.core.typing import AnyArray, FloatArray
 from vnca.io.mesh.mesh import Mesh
 from vnca.io.mesh.texture import BaseColour, base_colours
@@ -28,37 +28,22 @@ Shader = Callable[[AnyArray, AnyArray], AnyArray]
 
 
 @dataclass(frozen=True)
-class TurntableConfig:
+class TurntableConfig(Shot):
     """How a mesh is filmed."""
 
-    rows: int = 384
-    """Height of the film, pixels."""
-    columns: int = 384
-    """Width of the film, pixels."""
-    frames: int = 96
-    """Pictures in the film."""
-    turn: float = 360.0
-    """Degrees the camera goes around the mesh."""
-    azimuth: float = 0.0
-    """Where it begins, degrees; 0 is the front, looking along +y."""
     elevation: float = 15.0
     """How far above the horizon it stands, degrees."""
-    fps: float = 24.0
-    """Frames per second."""
-    background: tuple[float, float, float] = (0.9, 0.9, 0.9)
-    """Linear colour behind the mesh."""
+    turn: float = 360.0
+    """Degrees the camera goes around the mesh."""
+    background: str = "#f4f4f4"
+    """Colour behind the mesh, #rrggbb."""
+    frames: int = 96
+    """Pictures in the film."""
 
     def __post_init__(self) -> None:
-        if self.rows < 16 or self.columns < 16:
-            raise OptionError("`rows` and `columns`: at least 16 pixels are needed")
+        super().__post_init__()
         if self.frames < 1:
             raise OptionError(f"`frames` {self.frames}: at least 1 is needed")
-        if not -90 <= self.elevation <= 90:
-            raise OptionError(f"`elevation` {self.elevation}: must be -90 to 90 degrees")
-        if not (isfinite(self.azimuth) and isfinite(self.turn)):
-            raise OptionError("`azimuth` and `turn`: expected numbers of degrees")
-        if not 0 < self.fps <= 1000:
-            raise OptionError(f"`fps` {self.fps}: must be positive, at most 1000")
 
 
 class Turntable:
@@ -114,7 +99,7 @@ class Turntable:
         facing = np.where((normals @ forward)[:, None] > 0, -normals, normals)
         lambert = np.clip(facing @ (light / np.linalg.norm(light)), 0, 1)
         picture = np.empty((rows, columns, 3), np.float32)
-        picture[:] = config.background
+        picture[:] = parse_colour(config.background)
         picture[covered] = shader(triangles, weights) * (AMBIENT + (1 - AMBIENT) * lambert[:, None])
         shape = (config.rows, SAMPLES, config.columns, SAMPLES, 3)
         return picture.reshape(shape).mean((1, 3))

@@ -12,6 +12,7 @@ from pathlib import Path
 import vnca
 from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import remove_leftovers, writable_file, writable_folder
+from vnca.core.records import changed_fields
 from vnca.core.volume import refined_transform
 from vnca.core.watch import Watch
 from vnca.engine.backend import choose
@@ -67,6 +68,9 @@ class StylizeRun:
     processor has it."""
     resume: bool = False
     """Go on with a painting that was ended before its last frame, to the very same files."""
+    overwrite: bool = False
+    """Replace painted frames that the folder holds; with `resume`, where those are of another
+    painting."""
     on_error: OnError = "stop"
     """With a frame that cannot be read: stop, skip it, or hold the smoke of the one before."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
@@ -85,6 +89,8 @@ class StylizeRun:
                 raise OptionError(f"`{name}` {value}: must be positive")
         if self.preview is not None and self.preview.suffix.lower() not in FILMS:
             raise OptionError(f"`preview` {self.preview}: expected a film ({', '.join(FILMS)})")
+        if self.preview is None and (idle := changed_fields(self.film, FilmConfig())):
+            raise OptionError(f"`film.{idle[0]}`: shapes a film; name one with `preview`")
         if not self.colour_grid:
             raise OptionError("`colour_grid`: at least one name is needed")
         names = (self.smoke.density_grid, *self.colour_grid)
@@ -190,7 +196,7 @@ def _paint(painter: Painter, options: StylizeRun, watch: Watch) -> Iterator[Path
     total, finished = len(painter.sequence), 0
     with ExitStack() as stack:
         film = _film(options, painter, stack, watch)
-        unfinished = painter.begin(resume=options.resume)
+        unfinished = painter.begin(resume=options.resume, overwrite=options.overwrite)
         already = len(unfinished.sources)
         try:
             with closing(painter.paint(unfinished)) as paths:

@@ -1,11 +1,8 @@
-"""What training takes whatever it trains on: the hyperparameters of its course."""
+"""What training takes whatever it trains on: the hyperparameters that all trainings share."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from math import inf
-from typing import Annotated
-
-import tyro
 
 from vnca.core.errors import OptionError
 from vnca.engine.session import Compute
@@ -49,9 +46,12 @@ class Pictures:
 class TrainingConfig(ABC):
     """How a rule is trained, on whatever it is trained."""
 
-    rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = field(default_factory=RuleConfig)
+    rule: RuleConfig = field(default_factory=RuleConfig)
+    """The shape of the rule."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
+    """What is compared with the picture."""
     pool: PoolConfig = field(default_factory=PoolConfig)
+    """The states that rollouts start from."""
     decoder: int = 32
     """Units in each layer of the decoder, which draws between cells what is finer than they are;
     0 for none: cells are then interpolated."""

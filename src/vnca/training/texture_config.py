@@ -1,10 +1,6 @@
-"""Every hyperparameter of training a solid texture, with its presets."""
+"""Every hyperparameter of training a solid texture."""
 
-import dataclasses
 from dataclasses import dataclass, field
-from typing import Annotated
-
-import tyro
 
 from vnca.core.errors import OptionError
 from vnca.losses.appearance import AppearanceConfig
@@ -69,15 +65,19 @@ _COLOURS = AppearanceConfig(grey=False, samples=512)
 class TextureConfig(TrainingConfig):
     """How a rule for a solid texture is trained."""
 
-    rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = _PLAIN
+    rule: RuleConfig = _PLAIN
+    """The shape of the rule."""
     appearance: AppearanceConfig = _COLOURS
+    """What is compared with the picture."""
     pool: PoolConfig = field(default_factory=lambda: PoolConfig(size=16))
+    """The states that rollouts start from."""
     iterations: int = 1500
     """Iterations of training: patterns come late, colours early."""
     learning_rate: float = 2e-3
     """Adam's learning rate at its highest. Nothing from outside holds a texture's states: at the
     rates that suit smoke, many explode."""
-    slices: Annotated[SliceConfig, tyro.conf.arg(name="slice")] = field(default_factory=SliceConfig)
+    slice: SliceConfig = field(default_factory=SliceConfig)
+    """How the block is looked at."""
     block: int = 32
     """Cells along an edge of the block that is trained on; patterns are smaller than it."""
 
@@ -96,19 +96,4 @@ class TextureConfig(TrainingConfig):
     @property
     def pictures(self) -> Pictures:
         """Slices, or views of the mesh."""
-        return Pictures("slice.size", self.slices.size, self.slices.count)
-
-
-PRESETS = {
-    "draft": TextureConfig(),
-    "standard": TextureConfig(
-        rule=dataclasses.replace(_PLAIN, hidden=128),
-        slices=SliceConfig(count=2),
-        pool=PoolConfig(size=64),
-        block=64,
-        iterations=6000,
-        shortest_rollout=12,
-        longest_rollout=48,
-    ),
-}
-"""Training by name: `draft` in minutes on two cores, `standard` in hours or on a GPU."""
+        return Pictures("slice.size", self.slice.size, self.slice.count)

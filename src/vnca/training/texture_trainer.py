@@ -40,7 +40,7 @@ def texture_trainer(
         OptionError: If the memory budget is not enough.
     """
     rule = initial_rule(config)
-    scene = BlockScene(config.block, config.slices, mesh=mesh, decoder=rule.decoder, device=device)
+    scene = BlockScene(config.block, config.slice, mesh=mesh, decoder=rule.decoder, device=device)
     return Trainer(scene, rule, style, config, network, memory_budget=memory_budget)
 
 
