@@ -58,7 +58,8 @@ def films_of(picture: Path, work: Path) -> None:
         painted, film = work / f"{name}_{scene}", FILMS / f"{name}_{scene}.webp"
         last = painted / f"{scene}_{frames:04d}.vdb"
         some = ("--frames", f"{frames // 4}-{frames}")
-        made(last, "stylize", run, work / scene, "--out", painted, "--refine", 2, *some)
+        again = ("--resume", "--overwrite")
+        made(last, "stylize", run, work / scene, "--out", painted, "--refine", 2, *again, *some)
         made(film, "render", painted, "--out", film, *FILM)
 
 

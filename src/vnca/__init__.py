@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from vnca.painting.roll import stylize as stylize_frames
     from vnca.recipe.evaluation import Evaluation, evaluate
     from vnca.recipe.film import FilmConfig
+    from vnca.recipe.paint import paint
     from vnca.recipe.recorded import load
     from vnca.recipe.rendering import render
     from vnca.recipe.simulation import simulate
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 # Functions that share the name of a subpackage have one of their own here: an imported
 # subpackage takes its name in this one.
 _HOMES = {
+    "paint": "recipe.paint",
     "train": "recipe.smoke",
     "texture": "recipe.texture",
     "stylize": "recipe.stylizing",
@@ -125,6 +127,7 @@ __all__ = [
     "load",
     "load_network",
     "open_vdb",
+    "paint",
     "preset",
     "read_image",
     "read_smoke",

@@ -6,6 +6,7 @@ import pytest
 import trimesh
 
 from vnca.core.errors import OptionError
+from vnca.core.shot import parse_colour
 from vnca.core.typing import FloatArray
 from vnca.io.mesh.mesh import read_mesh
 from vnca.io.mesh.texture import put_on
@@ -56,7 +57,7 @@ def test_a_turning_mesh_stays_in_the_picture(tmp_path: Path) -> None:
         border = np.concatenate(
             [picture[[0, -1]].reshape(-1, 3), picture[:, [0, -1]].reshape(-1, 3)]
         )
-        np.testing.assert_allclose(border, 0.9, atol=1e-6)
+        np.testing.assert_allclose(border, parse_colour(FILM.background)[0], atol=1e-6)
         assert picture.min() < 0.1
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import tyro
 
 import vnca
-from vnca.cli.options import STDOUT, chosen, parse, print_json, say
-from vnca.cli.watch import Terminal
+from vnca.cli.options import STDOUT, chosen, parse, print_json
+from vnca.cli.terminal import Terminal, say
 from vnca.core.errors import OptionError
 from vnca.core.files import existing_file, whole_file, writable_file
 from vnca.core.volume import Volume

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from vnca.cli.options import parse, say
-from vnca.cli.watch import Terminal
+from vnca.cli.options import parse
+from vnca.cli.terminal import Terminal, say
 from vnca.core.typing import FloatArray
 from vnca.core.watch import Watch
 from vnca.io.picture import fit, read_style, write_image
@@ -82,6 +82,7 @@ def demonstrate(options: Demo) -> None:
             out=painted,
             frames=shown,
             preview=film,
+            overwrite=True,
             refine=1 if options.quick else 2,
             watch=watch,
         )

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import tyro
 
 from vnca.cli.options import parse, print_json
-from vnca.cli.watch import Terminal
+from vnca.cli.terminal import Terminal
 from vnca.io.smoke import SmokeFormat
 from vnca.painting.config import StylizeConfig
 from vnca.recipe import evaluation

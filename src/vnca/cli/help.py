@@ -30,6 +30,10 @@ ASKED = ("-h", "--help", "--help-all")
 _SMOKE = ("velocity-units", "fps", "up-axis")
 _FILM = ("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background")
 COMMON: Mapping[str, tuple[str, ...]] = {
+    "paint": (
+        *("out", "preset", "training-frame", "frames", "refine", "seed", *_SMOKE),
+        *("device", "resume", "overwrite"),
+    ),
     "train": (
         *("out", "preset", "iterations", "view.size", "seed", "texture", *_SMOKE),
         *("device", "memory-budget", "overwrite"),
@@ -48,7 +52,7 @@ COMMON: Mapping[str, tuple[str, ...]] = {
 }
 """The options that `--help` shows of a command, in its order; of others it shows all."""
 JSON_PROGRESS = "--json-progress"
-NAMES = dict.fromkeys(("config", "rule", "smoke", "grow", "film"), "")
+NAMES: dict[str, str] = dict.fromkeys(("config", "rule", "smoke", "grow", "film"), "")
 """What options of fields are called where it is not as the field; empty for a dataclass whose
 fields are options as if they were of the one around it."""
 SHOT_NAMES = {"fps": "film-fps", "step": "ray-step"}

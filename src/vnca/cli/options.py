@@ -1,11 +1,11 @@
 """From dataclasses to options: the one place that knows how a command line is read."""
 
 import dataclasses
+import importlib
 import io
 import json
 import re
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stderr
 from math import isfinite
 from pathlib import Path
@@ -20,7 +20,6 @@ from tyro.constructors import (
 )
 
 from vnca.cli.help import ASKED, SHORT, default_of, help_text, option_name
-from vnca.cli.progress import as_options, end_line
 from vnca.core.errors import OptionError
 
 T = TypeVar("T")
@@ -37,7 +36,7 @@ def _dataclass(asked: StructTypeInfo) -> StructConstructorSpec | None:
     hints = get_type_hints(asked.type, include_extras=True)
     fields = []
     for field in dataclasses.fields(asked.type):
-        hint = hints[field.name]
+        hint: Any = hints[field.name]
         if (name := option_name(asked.type, field.name)) is not None:
             hint = Annotated[hint, tyro.conf.arg(name=name)]
         default = default_of(field, asked.default)
@@ -127,12 +126,6 @@ def is_given(arguments: Sequence[str], option: str) -> bool:
     return any(word.partition("=")[0] == option for word in arguments)
 
 
-def say(line: str) -> None:
-    """Tell the user something that is not the result: on standard error, on a line of its own."""
-    end_line()
-    print(as_options(line), file=sys.stderr, flush=True)
-
-
 def print_json(value: Any) -> None:
     """Print a result as JSON on standard output; numbers that JSON has no word for are null."""
     print(json.dumps(_plain(value), indent=2, allow_nan=False))
@@ -148,3 +141,49 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if isfinite(value) else None
     return str(value)
+
+
+def run_subcommand(
+    command: str,
+    purpose: str,
+    commands: Mapping[str, str],
+    homes: Mapping[str, str],
+    arguments: Sequence[str],
+) -> None:
+    """Run a command of a command.
+
+    Args:
+        command: As it is called without `vnca`.
+        purpose: What it is there for, a sentence.
+        commands: What each of those to choose from does, by name.
+        homes: The function of each, as `module:function` of this package.
+        arguments: The name of one, and what it is to be given.
+
+    Raises:
+        OptionError: If there is none of that name.
+    """
+    name, rest = (arguments[0], arguments[1:]) if arguments else ("", ())
+    if name in ASKED:
+        print(usage(f"vnca {command}", purpose, commands))
+        return
+    if name not in commands:
+        raise OptionError(f"vnca {command}: expected one of {', '.join(commands)}, got '{name}'")
+    module, _, function = homes[name].partition(":")
+    getattr(importlib.import_module(f"vnca.cli.{module}"), function)(rest)
+
+
+def usage(call: str, purpose: str, commands: Mapping[str, str]) -> str:
+    """What `call --help` prints."""
+    width = max(map(len, commands))
+    return "\n".join(
+        [
+            f"usage: {call} COMMAND [OPTIONS]",
+            "",
+            purpose,
+            "",
+            "commands:",
+            *(f"  {name:{width}}  {what}" for name, what in commands.items()),
+            "",
+            f"`{call} COMMAND --help` lists the options of a command.",
+        ]
+    )

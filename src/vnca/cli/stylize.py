@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import tyro
 
 from vnca.cli.options import parse
-from vnca.cli.termination import finishing
-from vnca.cli.watch import Terminal
+from vnca.cli.terminal import Terminal, finishing
 from vnca.io.smoke import SmokeFormat
 from vnca.painting.config import StylizeConfig
 from vnca.recipe import painting

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import tyro
 
 from vnca.cli.options import chosen, is_given, parse
-from vnca.cli.watch import Terminal
+from vnca.cli.terminal import Terminal
 from vnca.core.errors import OptionError
 from vnca.io.smoke import SmokeFormat
 from vnca.recipe import smoke, texture

@@ -15,7 +15,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 from vnca.core.errors import OptionError
 
 T = TypeVar("T")
-_WANTED = {
+_WANTED: dict[Any, str] = {
     bool: "true or false",
     int: "a whole number",
     float: "a number",
@@ -105,9 +105,12 @@ def _fitted(hint: Any, value: Any) -> Any:
                 raise TypeError
             hints = [inside[0]] * len(value) if is_any_length else inside
             value = tuple(_fitted(one, item) for one, item in zip(hints, value, strict=True))
-    elif hint in (int, float):
-        fits = isinstance(value, Integral if hint is int else Real) and not isinstance(value, bool)
-        value = hint(value) if fits else value
+    elif hint is int:
+        fits = isinstance(value, Integral) and not isinstance(value, bool)
+        value = int(value) if fits else value
+    elif hint is float:
+        fits = isinstance(value, Real) and not isinstance(value, bool)
+        value = float(value) if fits else value
     elif hint is Path:
         fits = isinstance(value, (str, Path))
         value = Path(value) if fits else value
@@ -130,7 +133,7 @@ def _wanted(hint: Any) -> str:
         return f"a list, each {_wanted(inside[0])}"
     if dataclasses.is_dataclass(hint):
         return "its own fields by name"
-    return _WANTED.get(hint, hint.__name__)
+    return _WANTED.get(hint) or str(hint.__name__)
 
 
 def field_texts(kind: type) -> dict[str, str]:

@@ -29,7 +29,7 @@ CHOSEN = "none"
 """In the place of a number that is chosen when training begins; TOML has no word for it."""
 FOLDERS: dict[type[TrainingConfig], str] = {SmokeConfig: "smoke", TextureConfig: "texture"}
 """Where the package has its presets, by what they configure."""
-_SHIPPED = files("vnca.data").joinpath("presets")
+_SHIPPED = files("vnca.data") / "presets"
 _WIDTH = 98
 
 C = TypeVar("C", bound=TrainingConfig)
@@ -39,7 +39,7 @@ def preset_names(kind: type[TrainingConfig]) -> list[str]:
     """The presets of the package for a kind of training, the default first."""
     names = [
         Path(file.name).stem
-        for file in _SHIPPED.joinpath(FOLDERS[kind]).iterdir()
+        for file in (_SHIPPED / FOLDERS[kind]).iterdir()
         if file.name.endswith(SUFFIX)
     ]
     return sorted(names, key=lambda name: (name != DEFAULT, name))
@@ -61,7 +61,7 @@ def preset(kind: type[C], name: str | Path) -> C:
     """
     names = preset_names(kind)
     if str(name) in names:
-        text = _SHIPPED.joinpath(FOLDERS[kind], f"{name}{SUFFIX}").read_text(encoding="utf-8")
+        text = (_SHIPPED / FOLDERS[kind] / f"{name}{SUFFIX}").read_text(encoding="utf-8")
         return _read(kind, text, f"preset {name}")
     path = Path(name)
     if path.suffix != SUFFIX:
