@@ -19,6 +19,7 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import OnError
 from vnca.painting.roll import Painting
 from vnca.painting.roll import stylize as stylize_volumes
+from vnca.painting.still import StillSmoke
 from vnca.recipe.film import FilmConfig, Shown
 from vnca.recipe.options import changed, distributed
 from vnca.recipe.painting import StylizeRun, read_painted, run, with_scales
@@ -176,10 +177,12 @@ def _in_memory(
         smoke = with_fitted_scale(options.smoke, sequence)
         region = sequence_region(sequence, smoke, watch)
         require_dense_enough(sequence, smoke, rule.scales.density)
-        count, read = len(sequence), volumes(sequence, smoke, region.lattice)
+        still = StillSmoke(rule, smoke, watch.note)
+        count, read = len(sequence), volumes(sequence, smoke, region.lattice, still)
     else:
         laid, region = region_of(given)
-        count, read = len(laid), iter(laid)
+        still = StillSmoke(rule, options.smoke, watch.note)
+        count, read = len(laid), still.watched(laid, [None] * len(laid))
     rule = placed(rule, region, watch)
     paintings = stylize_volumes(
         read,

@@ -77,8 +77,8 @@ class Decoder:
 
         Reference: `engine/DECODE.md`, "There is no ω here".
         """
-        sines = 6 * (frequency,)
-        return Weights(*sines, 1.0, 1.0)
+        sine, linear = (frequency, frequency), (1.0, 1.0)
+        return Weights(*sine, *sine, *sine, *linear)
 
     @property
     def channels(self) -> int:
