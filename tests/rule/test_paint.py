@@ -121,8 +121,11 @@ def test_points_anywhere_find_the_cells_around_them() -> None:
 
 
 def test_a_backend_that_cannot_run_is_refused() -> None:
-    with pytest.raises(BackendUnavailableError, match="not on arrays"):
-        Between(rule(), "triton")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(native, "_native", None)
+        patch.setattr(native, "_reason", "no compiler", raising=False)
+        with pytest.raises(BackendUnavailableError, match="native cannot run"):
+            Between(rule(), "native")
 
 
 def test_nothing_lives_nowhere() -> None:
