@@ -32,7 +32,7 @@ class Scene(ABC, Generic[Viewpoint]):
     def __init__(
         self, domain: Domain, priors: FloatArray, device: torch.device | str, *, width: float
     ) -> None:
-        """Put the cells and what they are told, `[n, 7]`, where is computed."""
+        """Put the cells and their priors, `[n, 7]`, on the device."""
         self.domain, self.width = domain, width
         self.priors = torch.from_numpy(priors).to(device)
         self._places = torch.from_numpy(domain.places).to(device)
