@@ -100,7 +100,7 @@ def test_the_whole_job_in_five_lines(
     header, *rows = str(found).splitlines()
     assert header.split() == ["painted", "unstylized", "better"]
     assert {row.split()[0] for row in rows} == {measure.name for measure in found.measures}
-    assert found["style.gap_closed"] is not None
+    assert found["style.score"] is not None
     assert not [*tmp_path.glob("**/" + MODEL_NAME)]
 
 

@@ -21,7 +21,7 @@ SCENES = {"plume": (64, 40), "jets": (64, 40), "ring": (64, 40)}
 """Cells across a scene, and frames."""
 TRAINED = "plume_0030.vdb"
 TRAINING = (
-    *("--preset", "standard", "--iterations", 500, "--no-winds"),
+    *("--preset", "standard", "--iterations", 500, "--no-augment"),
     *("--hidden", 96, "--appearance.style-scale", 1.2),
 )
 """The rule is as large as the texture it begins with, and so are patterns, in cells."""

@@ -17,7 +17,7 @@ Vnca = Callable[..., Any]
 FEW = ("--warmup", "4", "--steps-per-frame", "2")
 SMALL = ("--size", "64", "--style-scale", "1", *FEW)
 NAMES = {
-    "style.gap_closed", "style.by_edges", "style.by_efficientnet",
+    "style.score", "style.by_edges", "style.by_efficientnet",
     "views.spread", "views.reprojection", "time.warp_short", "time.warp_long",
     "time.flow", "motion.direction", "motion.magnitude", "motion.transport",
     "density.mass_change", "density.moved",
@@ -93,7 +93,7 @@ def test_what_a_run_was_trained_on_is_what_it_is_measured_on(
     outcome = vnca(*evaluated)
     assert outcome.code == 0, outcome.err
     measures = json.loads((run / "evaluation" / "report.json").read_text())
-    assert list(measures["style.gap_closed"]["frames"]) == ["2"]
+    assert list(measures["style.score"]["frames"]) == ["2"]
     assert "trained with features 'efficientnet'" in outcome.err
     assert measures["style.by_efficientnet"]["trained_with"] is True
     assert measures["style.by_edges"]["trained_with"] is False

@@ -25,7 +25,8 @@ def paint(vnca: Vnca, model: Path, smoke: Path, tmp_path: Path) -> Paint:
     """Paints the three frames of smoke into a folder."""
 
     def run(out: str, *options: object) -> Any:
-        return vnca("stylize", model, smoke, "--out", tmp_path / out, *QUICK, *options)
+        anew = () if "--resume" in options else ("--overwrite",)
+        return vnca("stylize", model, smoke, "--out", tmp_path / out, *QUICK, *anew, *options)
 
     return run
 

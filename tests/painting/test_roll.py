@@ -181,7 +181,7 @@ def test_options_out_of_range_are_named() -> None:
 
 @pytest.mark.parametrize("reach", [0, 2])
 def test_cells_live_as_far_from_the_smoke_as_the_rule_was_trained_with(reach: int) -> None:
-    config = dataclasses.replace(RULE.config, reach=reach)
+    config = dataclasses.replace(RULE.config, dilation=reach)
     rule = dataclasses.replace(RULE, config=config)
     smoke = Volume(np.pad(ball(0).density, 4), None, (0, 0, 0), np.eye(4), 0)
     (painting,) = stylize([smoke], rule, StylizeConfig(), box=smoke.box)

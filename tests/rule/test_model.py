@@ -273,7 +273,7 @@ scales = st.floats(1e-6, 1e6)
         hidden=st.integers(1, 16),
         update_probability=st.floats(0, 1, exclude_min=True),
         steps_per_frame=st.integers(1, 4096),
-        reach=st.integers(0, 64),
+        dilation=st.integers(0, 64),
         sobel_divisor=scales,
         position_prior=st.booleans(),
     ),
@@ -354,3 +354,10 @@ def test_impossible_hyperparameters_name_their_option(wrong: dict[str, float]) -
     (name,) = wrong
     with pytest.raises(OptionError, match=f"`{name}`"):
         RuleConfig(**wrong)  # type: ignore[arg-type]
+
+
+def test_a_model_with_the_former_names_of_its_fields_loads() -> None:
+    kept = Path(__file__).parents[1] / "data" / "painting" / "rule.safetensors"
+    with safe_open(kept, framework="numpy") as file:
+        assert '"reach"' in file.metadata()["vnca"]
+    assert Model.load(kept).rule.config.dilation == 1

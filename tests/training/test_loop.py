@@ -156,9 +156,11 @@ def test_no_two_rollouts_share_a_mask(trainer: Make) -> None:
     assert 5 * 2 <= len(numbers) <= 5 * 4
 
 
-def test_winds_change_what_is_learned(trainer: Make) -> None:
+def test_augmentation_changes_what_is_learned(trainer: Make) -> None:
     moved = MotionConfig(weight=1.0)
-    still, turned = (trainer(iterations=6, motion=moved, winds=winds) for winds in (False, True))
+    still, turned = (
+        trainer(iterations=6, motion=moved, augment=augment) for augment in (False, True)
+    )
     for training in (still, turned):
         list(training.run())
     assert not same(still, turned)

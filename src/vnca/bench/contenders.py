@@ -153,7 +153,7 @@ def _plain(case: Case, place: Place, *, compiled: bool) -> Contender:
 
 
 def _packaged(case: Case, name: str, place: Place, *, threads: int) -> Contender:
-    """A backend of vnca, on the list of living cells."""
+    """A backend of vnca, on the list of active cells."""
     precision = "float32"
     if name == "native" and place.dtype == torch.bfloat16:
         # It rounds the factors of its products itself; states and sums stay float32.

@@ -238,7 +238,7 @@ def needed_flop(hidden: int) -> dict[str, int]:
 
 
 def needed_bytes(size: int) -> dict[str, int]:
-    """Read or written at least, per living cell, with numbers of `size` bytes.
+    """Read or written at least, per active cell, with numbers of `size` bytes.
 
     Forward: table of neighbours, priors, state, new state. Backward: the same two, state, gradient,
     new gradient. A mask drops single cells, but memory moves whole lines.

@@ -13,6 +13,7 @@ from vnca.core.errors import Terminated, VncaError
 
 COMMANDS = {
     "paint": "paint a sequence in the style of a picture: train, stylize and film in one go",
+    "styles": "list the styles that paint without training",
     "demo": "simulate, train, stylize and film a small plume, from nothing",
     "simulate": "write a smoke simulation to play with",
     "train": "learn a rule from one frame of smoke and one picture",

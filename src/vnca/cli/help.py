@@ -31,11 +31,11 @@ _SMOKE = ("velocity-units", "fps", "up-axis")
 _FILM = ("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background")
 COMMON: Mapping[str, tuple[str, ...]] = {
     "paint": (
-        *("out", "preset", "training-frame", "frames", "refine", "seed", *_SMOKE),
+        *("out", "style", "preset", "training-frame", "frames", "refine", "seed", *_SMOKE),
         *("device", "resume", "overwrite"),
     ),
     "train": (
-        *("out", "preset", "iterations", "view.size", "seed", "texture", *_SMOKE),
+        *("out", "preset", "iterations", "view.size", "seed", "texture", "graft", *_SMOKE),
         *("device", "memory-budget", "overwrite"),
     ),
     "stylize": (
@@ -45,7 +45,16 @@ COMMON: Mapping[str, tuple[str, ...]] = {
     "evaluate": ("out", "frames", "refine", "style", "size", "json"),
     "ablate": ("out", "preset", "seeds", "iterations", "json", "device", *_SMOKE),
     "render": (*("out", "frames", "turntable", "strip", "transparent", "gamma", *_FILM),),
-    "texture train": ("out", "preset", "iterations", "seed", "mesh", "device", "overwrite"),
+    "texture train": (
+        "out",
+        "preset",
+        "iterations",
+        "graft",
+        "seed",
+        "mesh",
+        "device",
+        "overwrite",
+    ),
     "bench step": ("backends", "threads", "json", "csv"),
     "bench train": ("preset", "backends", "device", "threads", "repeats", "json", "csv"),
     "bench stylize": ("model", "sequence", "frames", "backends", "threads", "json", "csv"),

@@ -1,4 +1,4 @@
-"""`vnca paint SMOKE PICTURE --out DIR`: the whole job."""
+"""`vnca paint SMOKE PICTURE --out DIR`, or `--style NAME`: the whole job."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -23,9 +23,12 @@ class Paint(paint.PaintRun):
 
     sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SMOKE")]
     """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
-    style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PICTURE")]
+    picture: Annotated[tyro.conf.Positional[Path | None], tyro.conf.arg(metavar="PICTURE")] = None
     """The picture to learn from (docs/guide/formats.md lists the formats); or a model that has
     learned already, a file or the folder of a run."""
+    style: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """A style of the library in the place of a picture; `vnca styles` lists them. It paints at once,
+    without training."""
     preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = "draft"
     """How the rule is trained: draft, standard, paper, or a TOML file."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
@@ -38,8 +41,7 @@ def run(arguments: Sequence[str]) -> None:
     smoke = paint.recorded_format(options)
     if smoke != options.smoke:
         missing: Any = tyro.MISSING
-        defaults = Paint(sequence=missing, style=Path(), out=missing, smoke=smoke)
-        defaults = dataclasses.replace(defaults, style=missing)
+        defaults = dataclasses.replace(options, sequence=missing, out=missing, smoke=smoke)
         options = parse(paint.COMMAND, Paint, arguments, default=defaults)
     with finishing() as stop_if_asked:
         for _ in paint.run(options, Terminal(stop_if_asked)):

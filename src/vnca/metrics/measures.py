@@ -67,12 +67,12 @@ def measures(survey: Survey) -> tuple[Measure, ...]:
 def _style(survey: Survey) -> Iterable[Measure]:
     style = joined_style_score(survey.style.values())
     yield Measure(
-        "style.gap_closed",
-        "Style gap closed",
+        "style.score",
+        "Normalised style score",
         "How much of the way from grey smoke to the picture the painting goes: 1 is as near as "
         "the picture's own parts are.",
         style.gap_closed,
-        "share of the gap",
+        "normalised: 0 plain smoke, 1 the picture's own parts",
         "higher",
         unstylized=0.0,
         more={
@@ -86,10 +86,10 @@ def _style(survey: Survey) -> Iterable[Measure]:
         known = [*judge.shares.values()]
         yield Measure(
             f"style.by_{judge.name}",
-            f"Style gap closed, by {judge.name}",
+            f"Normalised style score, by {judge.name}",
             f"The same in the eyes of the network '{judge.name}', {_PART[judge.trained_with]}.",
             float(np.mean(known)) if known else None,
-            "share of the gap",
+            "normalised: 0 plain smoke, 1 the picture's own parts",
             "higher",
             unstylized=0.0,
             more={"trained_with": judge.trained_with, "frames": judge.shares},
@@ -102,7 +102,7 @@ def _views(survey: Survey) -> Iterable[Measure]:
     yield Measure(
         "views.spread",
         "Spread over views",
-        "How much the share of the gap closed varies from side to side, above and below.",
+        "How much the normalised style score varies from side to side, above and below.",
         turn.style_score.spread,
         "standard deviation over mean",
         "lower",
@@ -113,7 +113,7 @@ def _views(survey: Survey) -> Iterable[Measure]:
                 {
                     "azimuth": viewpoint.azimuth,
                     "elevation": viewpoint.elevation,
-                    "gap_closed": share,
+                    "score": share,
                 }
                 for viewpoint, share in zip(
                     turn.style_score.viewpoints, turn.style_score.shares, strict=True
@@ -210,8 +210,8 @@ def _motion(texture: TextureMotion | str) -> Iterable[Measure]:
         if known:
             more = {
                 **getattr(known.rule, name),
-                "carried_noise": getattr(known.carried, name)["dis"],
-                "drifting_as_one": known.drift[at],
+                "advected_noise": getattr(known.carried, name)["dis"],
+                "rigid_drift": known.drift[at],
             }
         value = more.get("dis")
         yield Measure(
@@ -220,12 +220,13 @@ def _motion(texture: TextureMotion | str) -> Iterable[Measure]:
     yield Measure(
         "motion.transport",
         "Transport ratio",
-        "How much of what changes in the cells is not carried along: 0 if all is, 1 or more if "
-        "none is.",
+        "How much of what changes in the cells is not advected: 0 if all is, 1 or more if none is.",
         known.rule.transport if known else None,
         "share of the change",
         "lower",
-        more={"carried_noise": known.carried.transport, "speed": known.rule.speed} if known else {},
+        more={"advected_noise": known.carried.transport, "speed": known.rule.speed}
+        if known
+        else {},
         reason=reason,
     )
 

@@ -147,7 +147,8 @@ def measure_carried_noise(
 def measure_drift(rule: Rule, smoke: Volume, *, size: int = 128) -> tuple[float, float]:
     """L_dir and L_mag of a texture that moves as one, by the smoke's mean velocity.
 
-    A rule that is told no velocity can do this; one that does better follows the smoke.
+    A rule that is not conditioned on the velocity can do this; one that does better follows the
+    smoke.
 
     Args:
         rule: Its normalisers are used, not its weights.

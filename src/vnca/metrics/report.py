@@ -100,7 +100,7 @@ def _style(survey: Survey) -> Iterable[str]:
         "spectrum": "How much there is of coarse and fine",
     }
     parts = list(survey.style.values())
-    rows = ["<tr><th></th><th>painted</th><th>unstylized</th><th>cut-outs</th><th>closed</th></tr>"]
+    rows = ["<tr><th></th><th>painted</th><th>unstylized</th><th>cut-outs</th><th>score</th></tr>"]
     for at, name in enumerate(StyleDistances._fields):
         painted = np.mean([distances[at] for part in parts for distances in part.painted])
         plain, cutout = (
@@ -123,7 +123,7 @@ def _style(survey: Survey) -> Iterable[str]:
             ),
         ],
         x="frame",
-        y="share of the gap closed",
+        y="normalised style score",
     )
 
 
@@ -153,7 +153,7 @@ def _views(survey: Survey) -> Iterable[str]:
         lines.append(
             Line(f"from {label}", [s.azimuth for s in some], [*some.values()], shade, "dots")
         )
-    yield plot(lines, x="azimuth, degrees", y="share of the gap closed")
+    yield plot(lines, x="azimuth, degrees", y="normalised style score")
 
 
 def _time(survey: Survey) -> Iterable[str]:
@@ -163,7 +163,7 @@ def _time(survey: Survey) -> Iterable[str]:
     yield (
         "<p>From one place, frame by frame. The last row shows where a picture disagrees with the "
         "one before it once each pixel has been followed along the smoke's velocity: black where "
-        "the paint was carried, bright where it was not.</p>"
+        "the paint was advected, bright where it was not.</p>"
     )
     rows = [
         [(_shown(still.pair.painted), str(still.frame)) for still in survey.strip],
@@ -199,7 +199,7 @@ def _time(survey: Survey) -> Iterable[str]:
         )
     yield (
         '<p class="note">0: the same; 1: as different as pixels that have nothing to do with each '
-        "other. Paint that is carried lies below the dashed line.</p>"
+        "other. Paint that is advected lies below the dashed line.</p>"
     )
 
 
@@ -211,11 +211,11 @@ def _motion(texture: TextureMotion | str, frame: int) -> Iterable[str]:
     yield (
         f"<p>The smoke of frame {frame} is held still while the rule goes on painting, so that all "
         "that moves is texture. Beside it, noise that the velocity carries exactly, as the same "
-        "estimators see it, and a texture that drifts as one.</p>"
+        "estimators see it, and a texture that drifts rigidly.</p>"
     )
     heads = ("", "L_dir, network", "L_dir, DIS", "L_mag, network", "L_mag, DIS", "transport")
     rows = [f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"]
-    for label, motion in (("the rule", texture.rule), ("carried noise", texture.carried)):
+    for label, motion in (("the rule", texture.rule), ("advected noise", texture.carried)):
         values = [
             getattr(motion, what)[by]
             for what in ("direction", "magnitude")
@@ -223,7 +223,7 @@ def _motion(texture: TextureMotion | str, frame: int) -> Iterable[str]:
         ]
         rows.append(_row(label, [*values, motion.transport]))
     direction, magnitude = texture.drift
-    rows.append(_row("drifting as one", [direction, direction, magnitude, magnitude, None]))
+    rows.append(_row("rigid drift", [direction, direction, magnitude, magnitude, None]))
     yield f"<table>{''.join(rows)}</table>"
     yield (
         '<p class="note">L_mag in pixels a frame; the smoke moves by '

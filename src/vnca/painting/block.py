@@ -24,7 +24,7 @@ KIND = "texture"
 
 
 def block_domain(size: int) -> Domain:
-    """A cube of living cells whose opposite faces are neighbours.
+    """A cube of active cells whose opposite faces are neighbours.
 
     Raises:
         OptionError: If it is too small to be a texture or too large to be computed.
@@ -117,7 +117,7 @@ def grow(
     """Grow a block from nothing, and let it live on: one block after the other, without end.
 
     Args:
-        rule: Cells are told nothing but their neighbourhood: its priors are zero here.
+        rule: Cells know nothing but their neighbourhood: its priors are zero here.
         size: Cells along an edge.
         steps: Steps before the first block.
         seed: Same seed, same machine, same block.

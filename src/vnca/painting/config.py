@@ -16,8 +16,8 @@ class StylizeConfig:
     warmup: int = 64
     """Steps on the first frame before it is painted."""
     domain: DomainKind | None = None
-    """Where cells live: within reach of the smoke (active) or in all of its box; where they did in
-    training unless given."""
+    """Which cells are active: those near the smoke (active) or all of its box; as in training
+    unless given."""
     strength: float = 1.0
     """Colour of the painting, from 0 (white smoke) to 1."""
     density_strength: float = 1.0

@@ -32,7 +32,7 @@ from vnca.rule.rule import SMOKE_THRESHOLD, Rule
 UNPAINTED = 1.0
 """Linear colour of smoke far from all that the rule paints: white."""
 COLOUR_DILATION = 3
-"""How many cells beyond the living ones their colour goes on, so that faint smoke is no pale seam
+"""How many cells beyond the active ones their colour goes on, so that faint smoke is no pale seam
 where a renderer interpolates it."""
 
 
@@ -67,7 +67,7 @@ class Painting:
         smoke: The frame as it was read, on the grid of the painting.
         density: `[x, y, z]`, painted, in the units of the file; the array is made when it is asked
             for, as the smoke's is.
-        colour: Likewise, linear RGB `[x, y, z, 3]`; beside the living cells continued from them,
+        colour: Likewise, linear RGB `[x, y, z, 3]`; beside the active cells continued from them,
             white farther away.
         state: What it leaves to the next frame.
         coarse: The frame on the grid of the automaton; None where that is not known.
@@ -109,7 +109,7 @@ class Roll:
         box: Holds the smoke of all frames, in cells of the lattice that they share. Known from the
             files' headers before the first frame is read.
         compute: How steps are computed.
-        colour_dilation: How many cells beyond the living ones their colour goes on.
+        colour_dilation: How many cells beyond the active ones their colour goes on.
         grid: How many times as fine as the grid of the smoke the automaton's is.
         finer: How many times as fine as the automaton's the grid of the painting is; what is there
             between the cells, the decoder says.
@@ -233,13 +233,13 @@ class Roll:
         return Domain.around_smoke(
             smoke.density_field,
             threshold=SMOKE_THRESHOLD * self.rule.scales.density,
-            reach=self.rule.config.reach,
-            box=self.box.grown(self.rule.config.reach),
+            reach=self.rule.config.dilation,
+            box=self.box.grown(self.rule.config.dilation),
         )
 
     @cached_property
     def _whole_box(self) -> Domain:
-        return Domain.filling(self.box.grown(self.rule.config.reach))
+        return Domain.filling(self.box.grown(self.rule.config.dilation))
 
 
 def stylize(

@@ -109,7 +109,7 @@ def _state(cells: Any, values: Any, steps_done: int, roll: Roll) -> RollState:
     Raises:
         ValueError: If it does not fit the rule and the box of the sequence.
     """
-    box = roll.box.grown(roll.rule.config.reach)
+    box = roll.box.grown(roll.rule.config.dilation)
     shapes = (len(cells), 3), (len(cells), roll.rule.config.channels)
     if (cells.shape, values.shape) != shapes or steps_done < 0:
         raise ValueError(f"cells {cells.shape} with values {values.shape}, steps {steps_done}")

@@ -97,7 +97,7 @@ class Evaluation:
     report: Path | None = None
 
     def __getitem__(self, name: str) -> float | None:
-        """The value of a measure, such as `style.gap_closed`; None if it could not be measured."""
+        """The value of a measure, such as `style.score`; None if it could not be measured."""
         return {measure.name: measure.value for measure in self.measures}[name]
 
     def __str__(self) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from vnca.recipe.film import FilmConfig
 from vnca.recipe.options import changed, distributed
 from vnca.recipe.recorded import recorded, recorded_smoke
 from vnca.recipe.sequence import open_sequence
+from vnca.rendering.brightness import gamma_for_cell_opacity
+from vnca.rule.library import load_style
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import SMOKE_THRESHOLD, density_scale
 
@@ -32,6 +34,8 @@ RUN, PAINTED, FILM = "run", "painted", "film.mp4"
 ASKED_NAME = "paint.json"
 """In the folder: what was asked for, to go on with nothing else."""
 MODEL_SUFFIX = ".safetensors"
+CELL_OPACITY = 0.95
+"""Of a typical cell, for smoke painted in a style of the library: what those were trained at."""
 LOOKED_AT = 12
 """Frames, at most, of which the one with the most smoke is trained on."""
 _OF_TRAINING = ("preset", "training_frame", "device", "memory_budget")
@@ -44,9 +48,11 @@ class PaintRun:
 
     sequence: str
     """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
-    style: Path
+    picture: Path | None = None
     """The picture to learn from: PNG, JPEG, WebP, OpenEXR, …; or a model that has learned already,
     a file or the folder of a run."""
+    style: str | None = None
+    """A style of the library in the place of a picture: it paints at once, without training."""
     out: Path
     """Folder for all of it: run, painted and film.mp4."""
     preset: str = "draft"
@@ -55,8 +61,8 @@ class PaintRun:
     """Number of the frame that is trained on; one with much smoke unless given."""
     frames: str | None = None
     """Frames to paint, such as 30-53 or 1,4,7-9; all unless given."""
-    refine: Literal[1, 2, 3, 4] = 1
-    """Paint on a grid so many times as fine as that of the smoke."""
+    refine: int = 2
+    """Paint on a grid so many times as fine as that of the smoke, at most 8."""
     seed: int = 0
     """Same seed, same machine, same painting."""
     device: str = "auto"
@@ -73,27 +79,38 @@ class PaintRun:
     """How the painting is filmed."""
 
     def __post_init__(self) -> None:
+        if (self.picture is None) == (self.style is None):
+            raise OptionError("`picture`, `style`: expected one of them")
+        if self.style is not None:
+            load_style(self.style)
         if self.resume and self.overwrite:
             raise OptionError("`resume`, `overwrite`: one of them, not both")
         idle = [n for n in _OF_TRAINING if getattr(self, n) != getattr(PaintRun, n)]
         if idle and self.is_trained:
-            raise OptionError(f"`{idle[0]}`: {self.style} is a model, which is trained already")
+            raise OptionError(f"`{idle[0]}`: {self.name} is a model, which is trained already")
 
     @property
     def is_trained(self) -> bool:
-        """Whether the style is a model rather than a picture."""
-        return self.style.suffix.lower() == MODEL_SUFFIX or self.style.is_dir()
+        """Whether a model is given rather than a picture."""
+        path = self.picture
+        return path is None or path.suffix.lower() == MODEL_SUFFIX or path.is_dir()
+
+    @property
+    def name(self) -> str:
+        """What it is painted in the style of."""
+        return str(self.style or self.picture)
 
 
 def paint(
     sequence: str | Path,
-    style: str | Path,
-    out: str | Path,
+    picture: str | Path | None = None,
+    out: str | Path | None = None,
     *,
+    style: str | None = None,
     preset: str | Path = "draft",
     training_frame: int | None = None,
     frames: str | None = None,
-    refine: Literal[1, 2, 3, 4] = 1,
+    refine: int = 2,
     seed: int = 0,
     device: str = "auto",
     memory_budget: str = "auto",
@@ -107,8 +124,9 @@ def paint(
 
     Args:
         sequence: A folder, a pattern (`smoke_####.vdb`) or a file.
-        style: A picture to learn from; or a model, or the folder of a run.
+        picture: A picture to learn from; or a model, or the folder of a run.
         out: Folder for the run of the training, the painted frames and the film.
+        style: A style of the library, in the place of a picture.
         preset: How the rule is trained: `draft`, `standard`, `paper`, or the path of a TOML file.
         training_frame: Number of the frame that is trained on; one with much smoke unless given.
         frames: Which frames to paint, such as `30-53`; all unless given.
@@ -121,7 +139,7 @@ def paint(
         film: How it is filmed: a `FilmConfig`, or some of its fields.
         watch: Is told how far it has come, and may cancel.
         **options: Fields of `SmokeFormat` (`velocity_units="mantaflow"`); in the place of those
-            that were recorded where `style` is a model.
+            that were recorded where `picture` is a model.
 
     Returns:
         The painted files.
@@ -131,9 +149,12 @@ def paint(
             memory runs out.
         KeyboardInterrupt: If it is cancelled; the folder holds what it takes to resume.
     """
+    if out is None:
+        raise OptionError("`out`: a folder is needed")
     asked = PaintRun(
         sequence=str(sequence),
-        style=Path(style),
+        picture=None if picture is None else Path(picture),
+        style=style,
         out=Path(out),
         preset=str(preset),
         training_frame=training_frame,
@@ -152,9 +173,9 @@ def paint(
 
 def recorded_format(options: PaintRun) -> SmokeFormat:
     """How the model of the options says that smoke is read; as asked if there is none yet."""
-    if not options.is_trained:
+    if options.picture is None or not options.is_trained:
         return options.smoke
-    return recorded_smoke(options.style, Model.load(options.style)) or options.smoke
+    return recorded_smoke(options.picture, Model.load(options.picture)) or options.smoke
 
 
 def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
@@ -168,8 +189,12 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
     """
     sequence = open_sequence(options.sequence, options.frames, watch)
     goes_on = _begin(options)
-    model, smoke = options.style, options.smoke
-    if not options.is_trained:
+    model, smoke, scales = options.picture or Path(options.name), options.smoke, _Scales()
+    style = None
+    if options.style is not None:
+        style = load_style(options.style)
+        scales = _fitted(options, sequence)
+    elif not options.is_trained:
         try:
             model = _trained(options, sequence, watch, goes_on=goes_on)
         except KeyboardInterrupt:
@@ -186,11 +211,13 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
         refine=options.refine,
         resume=goes_on,
         overwrite=options.overwrite,
+        gamma=scales.gamma,
+        density_scale=scales.density,
         smoke=smoke,
         config=StylizeConfig(seed=options.seed),
         film=options.film,
     )
-    with closing(painting.run(asked, watch)) as paths:  # type: ignore[type-var]
+    with closing(painting.run(asked, watch, style)) as paths:  # type: ignore[type-var]
         yield from paths
 
 
@@ -231,7 +258,8 @@ def _begin(options: PaintRun) -> bool:
 def _asked(options: PaintRun) -> dict[str, Any]:
     """What has to be the same to go on, as JSON values."""
     asked = {k: v for k, v in recorded(options).items() if k not in (*_ANY_TIME, "film")}
-    asked |= {"style": str(options.style.absolute()), "vnca": vnca.__version__}
+    path = options.picture and str(options.picture.absolute())
+    asked |= {"picture": path, "vnca": vnca.__version__}
     if not options.is_trained:
         # A file of a user may have been changed.
         from vnca.training.presets import preset
@@ -259,7 +287,7 @@ def _trained(options: PaintRun, sequence: FrameSequence, watch: Watch, *, goes_o
         config = dataclasses.replace(preset(SmokeConfig, options.preset), seed=options.seed)
         asked = smoke.SmokeRun(
             frame=frame.path,
-            style=options.style,
+            style=options.picture or Path(),
             out=folder,
             preset=options.preset,
             overwrite=options.overwrite,
@@ -270,6 +298,24 @@ def _trained(options: PaintRun, sequence: FrameSequence, watch: Watch, *, goes_o
         )
         smoke.run(asked, watch)
     return folder
+
+
+class _Scales(NamedTuple):
+    """What smoke is painted with, where it is not as the rule was trained."""
+
+    density: float | None = None
+    gamma: float | None = None
+
+
+def _fitted(options: PaintRun, sequence: FrameSequence) -> _Scales:
+    """The density that counts as 1, and γ, for smoke that a style of the library never saw.
+
+    As training on the frame with the most smoke would choose them.
+    """
+    seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
+    density = read_smoke(_training_frame(options, sequence).path, seen).density_field.values
+    scale = density_scale(density)
+    return _Scales(scale, gamma_for_cell_opacity(density / scale, CELL_OPACITY))
 
 
 def _training_frame(options: PaintRun, sequence: FrameSequence) -> Frame:

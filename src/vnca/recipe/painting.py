@@ -58,7 +58,7 @@ class StylizeRun:
     """Paint on a grid so many times as fine as that of the smoke, at most 8."""
     gamma: float | None = None
     """Extinction of density 1, per cell of the smoke, with which the painting is to be seen:
-    brightness without training again. It is told in the files."""
+    brightness without training again. The files record it."""
     density_scale: float | None = None
     """Density that counts as 1; that of the training frame unless given."""
     backend: str = "auto"

@@ -191,7 +191,7 @@ def run(
     if smoke.velocity is None:
         if smoke_format.velocity_grid != NO_VELOCITY:
             watch.note(f"{missing_velocity(options.frame)}; the rule learns nothing of motion")
-        # Or it would be told in painting what training has not told it the meaning of.
+        # Or painting would condition it on what training gave no meaning to.
         config = dataclasses.replace(
             config, rule=dataclasses.replace(config.rule, velocity_prior=False)
         )

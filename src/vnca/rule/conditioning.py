@@ -1,4 +1,4 @@
-"""What a cell is told about the smoke beside its neighbourhood.
+"""What a cell is conditioned on beside its neighbourhood.
 
 Reference: VNCA section 3.3, "Encoding Priors".
 """
@@ -14,10 +14,10 @@ from vnca.rule.rule import PRIORS, Rule
 POSITION, DENSITY, VELOCITY = slice(0, 3), slice(3, 4), slice(4, 7)
 """Which priors of a cell are which."""
 SPEED_LIMIT = 2.0
-"""Cells are told no normalised speed above this: training has hardly met faster smoke, and what a
-rule has not met it paints badly. Nor must a file in other units blow a state up."""
+"""No cell is conditioned on a normalised speed above this: training has hardly met faster smoke,
+and what a rule has not met it paints badly. Nor must a file in other units blow a state up."""
 DENSITY_LIMIT = 4.0
-"""Nor are they told a greater normalised density."""
+"""Nor on a greater normalised density."""
 _SQUARABLE = 1e18
 """Single precision holds the square of it."""
 
@@ -26,7 +26,7 @@ def priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
     """Position, density and velocity `[n, 7]` at the cells of a domain.
 
     The position of a cell is (2i + 1)/H − 1, −1 to 1, in the box where the rule was trained; what
-    lies outside is told to lie at its border. Of a rule that does not know where that was, it is
+    lies outside counts as at its border. Of a rule that does not know where that was, it is
     the domain's box. Priors that the rule switches off, and velocity where the smoke has none, are
     zero.
     """
@@ -53,7 +53,7 @@ def _positions(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
 
 
 def normalised_velocity(velocity: FloatArray, rule: Rule) -> FloatArray:
-    """What cells are told of a velocity `[n, 3]`, cells per frame: its direction, limited in speed.
+    """What cells are conditioned on of a velocity `[n, 3]`, cells per frame, limited in speed.
 
     Zero if the rule switches it off.
     """

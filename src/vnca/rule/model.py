@@ -28,6 +28,9 @@ MODEL_NAME = "model.safetensors"
 CONFIG_NAME = "config.json"
 """Name, in a run folder, of what was asked for."""
 
+FORMER_NAMES = {"reach": "dilation"}
+"""What fields of a rule are called that earlier models call otherwise."""
+
 _METADATA = "vnca"
 _WEIGHTS = ("hidden", "bias", "output")
 _STYLE = "style"
@@ -118,7 +121,7 @@ class Model:
             _check_format(path, described["format_version"])
             rule = Rule(
                 **{name: _single_precision(name, tensors[name]) for name in _WEIGHTS},
-                config=from_record(RuleConfig, described["rule"]),
+                config=from_record(RuleConfig, _renamed(described["rule"])),
                 scales=from_record(Scales, described["scales"]),
                 place=_place(described.get("place")),
                 decoder=_decoder(tensors),
@@ -132,6 +135,13 @@ class Model:
         if style is not None and (style.dtype != np.uint8 or style.shape[2:] != (3,)):
             raise ModelError(f"{path}: the style thumbnail is not an 8-bit picture")
         return cls(rule, training, style, version)
+
+
+def _renamed(record: Any) -> Any:
+    """The shape of a rule with its fields as they are called now."""
+    if not isinstance(record, dict):
+        return record
+    return {FORMER_NAMES.get(name, name): value for name, value in record.items()}
 
 
 def _decoder(tensors: dict[str, NDArray[Any]]) -> Decoder | None:

@@ -39,19 +39,20 @@ class RuleConfig:
     steps_per_frame: int = 16
     """Steps of the automaton between two frames; the rule is taught to move at this pace."""
     domain: DomainKind = "active"
-    """Where cells live: within reach of the smoke, or in all of its box as in the paper."""
-    reach: int = 1
-    """Cells live up to this far from the smoke; beyond is the outside that border cells see."""
+    """Which cells are active: those near the smoke, or all of its box as in the paper."""
+    dilation: int = 1
+    """Cells are active up to this far from the smoke; beyond is the outside that border cells
+    see."""
     sobel_divisor: float = 32.0
     """Divisor of the 3×3×3 Sobel filters."""
     laplacian_divisor: float = 26.0
     """Divisor of the 27-point Laplacian."""
     position_prior: bool = True
-    """Tell cells where in the box of the training they are."""
+    """Condition cells on where in the box of the training they are."""
     density_prior: bool = True
-    """Tell cells the density of the smoke."""
+    """Condition cells on the density of the smoke."""
     velocity_prior: bool = True
-    """Tell cells the velocity of the smoke."""
+    """Condition cells on the velocity of the smoke."""
 
     def __post_init__(self) -> None:
         if self.channels < 4:
@@ -62,8 +63,8 @@ class RuleConfig:
             raise OptionError(f"`update_probability` {self.update_probability}: must be in (0, 1]")
         if not 1 <= self.steps_per_frame <= 4096:
             raise OptionError(f"`steps_per_frame` {self.steps_per_frame}: must be from 1 to 4096")
-        if not 0 <= self.reach <= 64:
-            raise OptionError(f"`reach` {self.reach}: must be from 0 to 64 cells")
+        if not 0 <= self.dilation <= 64:
+            raise OptionError(f"`dilation` {self.dilation}: must be from 0 to 64 cells")
         if not all(0 < d < math.inf for d in (self.sobel_divisor, self.laplacian_divisor)):
             raise OptionError("`sobel_divisor` and `laplacian_divisor` must be positive")
 

@@ -55,6 +55,9 @@ class TrainingConfig(ABC):
     decoder: int = 32
     """Units in each layer of the decoder, which draws between cells what is finer than they are;
     0 for none: cells are then interpolated."""
+    graft: str = "none"
+    """The rule of another picture that the texture starts from, which takes a third of the
+    iterations: a style of the library, a model, auto for the nearest style that fits, or none."""
     iterations: int = 400
     """Iterations of training."""
     learning_rate: float = 3e-3

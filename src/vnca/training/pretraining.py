@@ -12,6 +12,8 @@ from vnca.training.presets import DEFAULT, preset
 from vnca.training.smoke_config import SmokeConfig
 from vnca.training.texture_config import TextureConfig
 
+AUTO = "auto"
+"""In the place of the name of a style: the nearest to the picture."""
 SHAPE = ("channels", "hidden", "update_probability", "sobel_divisor", "laplacian_divisor")
 """In what a rule must be like the texture that it begins with."""
 LARGEST_PICTURE = 128
@@ -41,6 +43,7 @@ def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | N
             style_scale=picture / plain.slice.cells,
         ),
         decoder=config.decoder,
+        graft=config.graft,
         iterations=iterations,
         features=config.features,
         backend=config.backend,

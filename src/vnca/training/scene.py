@@ -46,7 +46,16 @@ class Scene(ABC, Generic[Viewpoint]):
         decoder: Decoder | None = None,
         backend: str = "auto",
     ) -> None:
-        """Put the cells, their priors `[n, 7]` and the decoder on the device."""
+        """Put the cells, their priors `[n, 7]` and the decoder on the device.
+
+        Args:
+            domain: The active cells.
+            priors: `[n, 7]`.
+            device: Where rollouts and pictures are computed.
+            width: Cells across a picture.
+            decoder: What is seen between cells; states are interpolated unless given.
+            backend: What decodes.
+        """
         self.domain, self.width = domain, width
         self.priors = torch.from_numpy(priors).to(device)
         self._places = torch.from_numpy(domain.places).to(device)

@@ -70,10 +70,10 @@ class SmokeConfig(TrainingConfig):
     texture: float = 0.0
     """Iterations on a solid texture of the picture for each one on the smoke, made before those:
     patterns come from there. 0 begins with nothing."""
-    winds: bool = False
-    """Tell each state of the pool another speed and density of the smoke, and for every other turn
-    the velocity and carry all of the smoke along: the rule learns from one frame to paint smoke
-    that moves otherwise."""
+    augment: bool = False
+    """Condition each state of the pool on another speed and density of the smoke, and for every
+    other turn the velocity and add one that all cells share: the rule learns from one frame to
+    paint smoke that moves otherwise."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

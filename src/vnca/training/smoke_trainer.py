@@ -45,7 +45,9 @@ def smoke_trainer(
     smoke = on_lattice(smoke, Lattice.of(smoke.index_to_world, what), what)
     rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
     rule = replace(rule, decoder=config.initial_decoder())
-    scene = SmokeScene(smoke, rule, config.view, winds=config.winds, device=device)
+    scene = SmokeScene(
+        smoke, rule, config.view, augment=config.augment, device=device, backend=config.backend
+    )
     rule = replace(rule, place=Region(Lattice(smoke.index_to_world), scene.domain.box))
     motion = None
     if config.motion.weight and scene.moves:

@@ -40,7 +40,14 @@ def texture_trainer(
         OptionError: If the memory budget is not enough.
     """
     rule = initial_rule(config)
-    scene = BlockScene(config.block, config.slice, mesh=mesh, decoder=rule.decoder, device=device)
+    scene = BlockScene(
+        config.block,
+        config.slice,
+        mesh=mesh,
+        decoder=rule.decoder,
+        device=device,
+        backend=config.backend,
+    )
     return Trainer(scene, rule, style, config, network, memory_budget=memory_budget)
 
 

@@ -22,7 +22,7 @@ from vnca.training.scenes.smoke import (
 from vnca.training.smoke_config import SmokeConfig, ViewConfig
 from vnca.training.smoke_trainer import choose_scales
 
-WINDY = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(velocity=2.0), seed=0)
+MOVING = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(velocity=2.0), seed=0)
 
 
 def scene(smoke: Volume, view: ViewConfig | None = None, **scales: float) -> SmokeScene:
@@ -30,8 +30,8 @@ def scene(smoke: Volume, view: ViewConfig | None = None, **scales: float) -> Smo
     return SmokeScene(smoke, rule, view or ViewConfig(size=32))
 
 
-def in_winds(smoke: Volume, rule: Rule = WINDY) -> SmokeScene:
-    return SmokeScene(smoke, rule, ViewConfig(size=32), winds=True)
+def augmented(smoke: Volume, rule: Rule = MOVING) -> SmokeScene:
+    return SmokeScene(smoke, rule, ViewConfig(size=32), augment=True)
 
 
 def test_the_density_that_counts_as_one_ignores_empty_cells_and_a_few_bright_ones() -> None:
@@ -195,77 +195,79 @@ def test_a_look_is_differentiable_in_what_is_shown_only(tiny_smoke: Volume) -> N
     assert not moved[4:].any()
 
 
-def test_a_wind_turns_all_of_the_velocity_alike_and_carries_it_along(tiny_smoke: Volume) -> None:
-    windy = in_winds(tiny_smoke)
-    before = windy.velocity.clone(), windy.priors.clone()
-    blown, other = windy.augmented(3), windy.augmented(5)
+def test_an_augmentation_turns_all_of_the_velocity_alike_and_adds_to_it(tiny_smoke: Volume) -> None:
+    base = augmented(tiny_smoke)
+    before = base.velocity.clone(), base.priors.clone()
+    turned, other = base.augmented(3), base.augmented(5)
     # Among cells, velocities differ as they did, turned and scaled.
-    own, new = (s.velocity.numpy().astype(float) for s in (windy, blown))
+    own, new = (s.velocity.numpy().astype(float) for s in (base, turned))
     affine, *_ = np.linalg.lstsq(np.c_[own, np.ones(len(own))], new, rcond=None)
     np.testing.assert_allclose(np.c_[own, np.ones(len(own))] @ affine, new, atol=1e-4)
     factor = np.cbrt(np.linalg.det(affine[:3]))
     assert SPEEDS[0] <= factor <= SPEEDS[1]
     np.testing.assert_allclose(affine[:3] @ affine[:3].T, factor**2 * np.eye(3), atol=1e-4)
-    assert 0 < np.linalg.norm(affine[3]) <= STRONGEST * WINDY.scales.velocity
-    assert torch.equal(windy.augmented(3).velocity, blown.velocity)
-    assert not torch.allclose(other.velocity, blown.velocity)
-    assert torch.equal(windy.velocity, before[0])
-    assert torch.equal(windy.priors, before[1])
+    assert 0 < np.linalg.norm(affine[3]) <= STRONGEST * MOVING.scales.velocity
+    assert torch.equal(base.augmented(3).velocity, turned.velocity)
+    assert not torch.allclose(other.velocity, turned.velocity)
+    assert torch.equal(base.velocity, before[0])
+    assert torch.equal(base.priors, before[1])
 
 
-def test_even_places_move_as_the_smoke_does_but_slower_or_faster(tiny_smoke: Volume) -> None:
-    windy = in_winds(tiny_smoke)
-    speed, speeds = (s.velocity.norm(dim=-1) for s in (windy, windy.augmented(4)))
+def test_at_even_slots_the_smoke_moves_slower_or_faster(
+    tiny_smoke: Volume,
+) -> None:
+    base = augmented(tiny_smoke)
+    speed, speeds = (s.velocity.norm(dim=-1) for s in (base, base.augmented(4)))
     factors = speeds[speed > 0] / speed[speed > 0]
     torch.testing.assert_close(factors, factors[:1].expand_as(factors))
     assert SPEEDS[0] <= float(factors[0]) <= SPEEDS[1]
-    torch.testing.assert_close(windy.augmented(4).velocity, windy.velocity * factors[0])
+    torch.testing.assert_close(base.augmented(4).velocity, base.velocity * factors[0])
 
 
-def test_the_rule_is_told_the_wind_and_another_density_than_is_seen(tiny_smoke: Volume) -> None:
-    windy = in_winds(tiny_smoke)
-    blown = windy.augmented(3)
-    told = torch.from_numpy(normalised_velocity(blown.velocity.numpy(), WINDY))
-    assert torch.equal(blown.priors[:, 4:], told)
-    assert torch.equal(blown.priors[:, :3], windy.priors[:, :3])
-    thin, dense = windy.priors[:, 3], blown.priors[:, 3]
+def test_the_velocity_and_density_conditioned_on_are_not_those_seen(tiny_smoke: Volume) -> None:
+    base = augmented(tiny_smoke)
+    turned = base.augmented(3)
+    told = torch.from_numpy(normalised_velocity(turned.velocity.numpy(), MOVING))
+    assert torch.equal(turned.priors[:, 4:], told)
+    assert torch.equal(turned.priors[:, :3], base.priors[:, :3])
+    thin, dense = base.priors[:, 3], turned.priors[:, 3]
     torch.testing.assert_close(dense, thin * (dense.max() / thin.max()))
     assert 1 / DENSEST <= dense.max() / thin.max() <= DENSEST
-    assert torch.equal(blown._density, windy._density)
+    assert torch.equal(turned._density, base._density)
 
 
 def test_no_more_density_is_told_in_training_than_in_painting(tiny_smoke: Volume) -> None:
     """What is denser than the limit is made denser or thinner before it is limited."""
     steep = replace(tiny_smoke, density=tiny_smoke.density**4 * 6)
-    windy = in_winds(steep)
-    seen = windy._density
+    base = augmented(steep)
+    seen = base._density
     assert seen.max() > 5
     for slot in range(12):
-        told = windy.augmented(slot).priors[:, 3]
+        told = base.augmented(slot).priors[:, 3]
         assert told.max() <= 4
         thin = told < 4
         factor = (told / seen)[thin & (seen > 0)]
         torch.testing.assert_close(factor, factor[:1].expand_as(factor))
         torch.testing.assert_close(told, (factor[0] * seen).clamp_max(4))
-    assert not in_winds(steep, without_density()).augmented(3).priors[:, 3].any()
+    assert not augmented(steep, without_density()).augmented(3).priors[:, 3].any()
 
 
 def without_density() -> Rule:
-    return Rule.initial(replace(WINDY.config, density_prior=False), WINDY.scales, seed=0)
+    return Rule.initial(replace(MOVING.config, density_prior=False), MOVING.scales, seed=0)
 
 
-def test_a_rule_that_is_told_no_velocity_is_told_no_wind(tiny_smoke: Volume) -> None:
-    deaf = Rule.initial(replace(WINDY.config, velocity_prior=False), Scales(), seed=0)
-    blown = in_winds(tiny_smoke, deaf).augmented(3)
-    assert blown.velocity.any()
-    assert not blown.priors[:, 4:].any()
+def test_a_rule_without_the_velocity_prior_has_none_when_augmented(tiny_smoke: Volume) -> None:
+    deaf = Rule.initial(replace(MOVING.config, velocity_prior=False), Scales(), seed=0)
+    turned = augmented(tiny_smoke, deaf).augmented(3)
+    assert turned.velocity.any()
+    assert not turned.priors[:, 4:].any()
 
 
-def test_without_winds_all_places_are_the_same(tiny_smoke: Volume) -> None:
+def test_without_augmentation_all_slots_are_the_same(tiny_smoke: Volume) -> None:
     calm = scene(tiny_smoke)
     assert calm.augmented(3) is calm
 
 
-def test_no_wind_blows_where_nothing_moves(tiny_smoke: Volume) -> None:
-    still = in_winds(replace(tiny_smoke, velocity=None))
+def test_nothing_is_augmented_where_nothing_moves(tiny_smoke: Volume) -> None:
+    still = augmented(replace(tiny_smoke, velocity=None))
     assert still.augmented(3) is still

@@ -28,11 +28,11 @@ from vnca.training.scene import Scene, colours, density_factors
 from vnca.training.smoke_config import ViewConfig
 
 SPEEDS = (0.25, 1.5)
-"""How much slower or faster than in the frame smoke moves in a wind, at most."""
+"""How much slower or faster than in the frame augmented smoke moves, at most."""
 STRONGEST = 1.5
-"""The strongest wind that carries all of the smoke along, in units of the smoke's typical speed."""
+"""The greatest velocity that is added to all of the smoke, in units of its typical speed."""
 DENSEST = 2.0
-"""How much denser, or thinner, than it is the rule is told that it is, at most."""
+"""How much denser, or thinner, the density is that the rule is conditioned on, at most."""
 PREVIEW_VIEWS = ((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (30.0, 60.0))
 """Azimuth and elevation: front, right, back and from above, degrees."""
 PREVIEW_STEP = 0.5
@@ -60,7 +60,8 @@ class SmokeScene(Scene[SmokeViewpoint]):
 
     Attributes:
         view: How it is looked at.
-        winds: Whether its velocity, and the density told, are others in each augmented.
+        augment: Whether the velocity and the density that a rule is conditioned on differ from
+            slot to slot of the pool.
         box: The cells that hold smoke lie in it.
         velocity: `[n, 3]`, cells per frame.
         moves: Whether the smoke has any.
@@ -72,8 +73,9 @@ class SmokeScene(Scene[SmokeViewpoint]):
         rule: Rule,
         view: ViewConfig,
         *,
-        winds: bool = False,
+        augment: bool = False,
         device: torch.device | str = "cpu",
+        backend: str = "auto",
     ) -> None:
         """Prepare a frame.
 
@@ -81,33 +83,40 @@ class SmokeScene(Scene[SmokeViewpoint]):
             smoke: The frame; must hold smoke.
             rule: Its normalisers, switches and decoder are used, not the weights of its automaton.
             view: How it is looked at; gamma is the rule's.
-            winds: Whether its velocity, and the density told, are others in each augmented.
+            augment: Whether the velocity and the density that the rule is conditioned on differ
+                from slot to slot of the pool.
             device: Where rollouts and pictures are computed.
+            backend: What decodes.
 
         Raises:
             GridError: If there is no smoke in the frame.
         """
         self.view = view
-        self.winds = winds
+        self.augment = augment
         self.box = smoke_bounds(smoke, rule.scales.density)
-        box = self.box.grown(rule.config.reach)
+        box = self.box.grown(rule.config.dilation)
         if rule.config.domain == "box":
             domain = Domain.filling(box)
         else:
             domain = Domain.around_smoke(
                 smoke.density_field,
                 threshold=SMOKE_THRESHOLD * rule.scales.density,
-                reach=rule.config.reach,
+                reach=rule.config.dilation,
                 box=box,
             )
         width = view_width(self.box, smoke.index_to_world)
         if view.pixels_per_cell is not None:
             width = min(width, view.size / view.pixels_per_cell)
         super().__init__(
-            domain, priors(domain, smoke, rule), device, width=width, decoder=rule.decoder
+            domain,
+            priors(domain, smoke, rule),
+            device,
+            width=width,
+            decoder=rule.decoder,
+            backend=backend,
         )
         self._place = _stood(smoke.index_to_world)
-        self.samples = max(domain.box.shape) / view.step
+        self.samples = max(domain.box.shape) / view.step * self._supersampling**2
         self.gamma = rule.scales.gamma
         self._grey_gamma = self.gamma
         if view.mode != "paper":
@@ -126,13 +135,13 @@ class SmokeScene(Scene[SmokeViewpoint]):
         self._rule = rule
 
     def augmented(self, slot: int) -> "SmokeScene":
-        """The smoke in the wind of a slot: faster or slower, and told to be denser or thinner.
+        """The smoke as the state at a slot sees it: faster or slower, denser or thinner.
 
-        At odd places its velocity is turned at random, too, and all of it carried along one way.
-        The rule is told the velocity of the wind, and motion is judged by it; the density that is
+        At odd slots its velocity is turned at random, too, and one that all cells share is added.
+        The rule is conditioned on that velocity, and motion is judged by it; the density that is
         seen stays as it is.
         """
-        if not (self.winds and self.moves):
+        if not (self.augment and self.moves):
             return self
         random = np.random.default_rng(slot)
         velocity = self.velocity.cpu().numpy() * random.uniform(*SPEEDS)

@@ -79,6 +79,7 @@ class BlockScene(Scene[list[Cut]]):
         mesh: Mesh | None = None,
         decoder: Decoder | None = None,
         device: torch.device | str = "cpu",
+        backend: str = "auto",
     ) -> None:
         """Prepare a block.
 
@@ -88,14 +89,18 @@ class BlockScene(Scene[list[Cut]]):
             mesh: Seen from all sides beside the slices.
             decoder: What is seen between cells; they are interpolated unless given.
             device: Where rollouts and pictures are computed.
+            backend: What decodes.
 
         Raises:
             OptionError: If the size cannot work.
         """
         domain = block_domain(size)
         nothing = np.zeros((len(domain), PRIORS), np.float32)
-        super().__init__(domain, nothing, device, width=slices.cells, decoder=decoder)
+        super().__init__(
+            domain, nothing, device, width=slices.cells, decoder=decoder, backend=backend
+        )
         self.slices = slices
+        self.samples = float(slices.supersampling**2)
         self.views: list[MeshView] = []
         if mesh is not None:
             self.views = mesh_views(mesh, slices.size * slices.supersampling, slices.cells)

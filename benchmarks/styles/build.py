@@ -1,0 +1,80 @@
+"""Pack trained rules into the library of styles of the package.
+
+python benchmarks/styles/build.py SMOKE OUT NAME=RUN ...
+
+SMOKE is a frame that thumbnails are painted on, OUT the folder of the library, RUN the folder of a
+training. What a model tells of the smoke that it was trained on is left out: the library paints
+other smoke.
+"""
+
+import dataclasses
+import io
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+import vnca
+from vnca.io.picture import resize, to_srgb8
+from vnca.recipe.film import FilmConfig, picture
+from vnca.recipe.sequence import region_bounds
+from vnca.rule.library import SUFFIX, THUMBNAIL
+from vnca.rule.model import Model
+
+SIZE = 160
+"""Rows and columns of a thumbnail, pixels."""
+TITLES = {
+    "cafe": "Vincent van Gogh, Café Terrace at Night (1888)",
+    "church": "Vincent van Gogh, The Church at Auvers (1890)",
+    "harvest": "Vincent van Gogh, The Harvest (1888)",
+    "circuit": "copper traces on a green board",
+    "embers": "glowing cracks in a black crust",
+    "frost": "pale feathers of ice on deep blue",
+    "fur": "tawny strands",
+    "ink": "black and sepia ink in water",
+    "marble": "white stone with golden veins",
+    "mosaic": "small tiles in flowing rows",
+    "rust": "flaking paint over rust",
+    "stained_glass": "leaded glass, lit from behind",
+    "threads": "pale threads on dark teal",
+    "watercolour": "washes with dark rims",
+    "woodcut": "black lines cut in wood",
+}
+
+
+def main(smoke: Path, out: Path, runs: dict[str, Path]) -> None:
+    """Write a model and a thumbnail of each run."""
+    out.mkdir(parents=True, exist_ok=True)
+    for name, run in runs.items():
+        model = packed(vnca.load(run), name)
+        model.save(out / (name + SUFFIX))
+        (out / (name + THUMBNAIL)).write_bytes(thumbnail(model, smoke))
+        print(name)
+
+
+def packed(model: Model, name: str) -> Model:
+    """The model with nothing in it of the smoke that it was trained on but its place in none."""
+    kept = ("style", "preset", "iterations", "seed", "features", "picture_cells")
+    training = {"title": TITLES[name]} | {k: v for k, v in model.training.items() if k in kept}
+    return Model(dataclasses.replace(model.rule, place=None), training, model.style)
+
+
+def thumbnail(model: Model, smoke: Path) -> bytes:
+    """A WebP picture of a frame painted with a model."""
+    (frame,) = vnca.stylize(model, smoke, refine=3, velocity_units="mantaflow")
+    shown = frame.shown
+    bounds = region_bounds(shown.smoke.box, shown.smoke.index_to_world)
+    film = FilmConfig(rows=2 * SIZE, columns=2 * SIZE, elevation=10.0)
+    view = picture(shown, film, bounds=bounds, turned=0.0)
+    seen = resize(view.over([0.01] * 3).numpy(), SIZE, SIZE)
+    stream = io.BytesIO()
+    Image.fromarray(to_srgb8(np.clip(seen, 0, 1))).save(stream, "WEBP", quality=85)
+    return stream.getvalue()
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 4:
+        sys.exit(__doc__)
+    given = dict(word.split("=", 1) for word in sys.argv[3:])
+    main(Path(sys.argv[1]), Path(sys.argv[2]), {name: Path(run) for name, run in given.items()})
