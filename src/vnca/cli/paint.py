@@ -27,8 +27,8 @@ class Paint(paint.PaintRun):
     """The picture to learn from (docs/guide/formats.md lists the formats); or a model that has
     learned already, a file or the folder of a run."""
     style: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """A style of the library in the place of a picture; `vnca styles` lists them. It paints at once,
-    without training."""
+    """A style of the library in the place of a picture (vnca styles lists them): it paints at
+    once, without training."""
     preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = "draft"
     """How the rule is trained: draft, standard, paper, or a TOML file."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
