@@ -106,7 +106,7 @@ def grown(task: Task, rule: Rule, size: int) -> dict[str, Any]:
     style, network = task.begin()
     began = time.process_time()
     compute = Compute(threads=task.threads)
-    block = next(grow(rule, size, steps=task.steps, seed=task.seed, compute=compute))
+    block = next(grow(rule, size, steps=task.steps, seed=task.seed, compute=compute)).colours
     made = time.process_time() - began
     return {"make_s": round(made, 1), "peak_mb": peak_mb(), **judged(task, block, style, network)}
 

@@ -27,14 +27,15 @@ def test_the_texture_is_of_the_rule_and_the_picture_that_smoke_is_trained_with()
     assert texture.iterations == 125
     assert texture.seed == 3
     assert texture.rule.hidden == config.rule.hidden
+    assert texture.decoder == config.decoder
     assert texture.rule.sobel_divisor == config.rule.sobel_divisor
-    assert texture.appearance.style_scale * texture.slice.size == pytest.approx(60)
+    assert texture.appearance.style_scale * texture.slice.cells == pytest.approx(60)
 
 
 def test_the_patterns_of_a_large_picture_are_kept_within_the_block() -> None:
     texture = pretraining_config(preset(SmokeConfig, "standard"), picture=1000)
     assert texture is not None
-    assert texture.appearance.style_scale * texture.slice.size == LARGEST_PICTURE
+    assert texture.appearance.style_scale * texture.slice.cells == LARGEST_PICTURE
 
 
 def test_the_paper_begins_with_nothing() -> None:

@@ -13,6 +13,7 @@ from vnca.io.mesh.texture import put_on
 from vnca.meshes.bake import Placement, bake, to_png
 from vnca.meshes.turntable import Turntable, TurntableConfig, solid, textured
 from vnca.meshes.unwrap import unwrapped
+from vnca.painting.block import Block
 
 FILM = TurntableConfig(rows=48, columns=64, frames=4)
 
@@ -34,11 +35,11 @@ def test_the_baked_mesh_looks_like_the_solid_from_all_sides(ball: Path, block: F
     mesh = read_mesh(ball)
     place = Placement.of(mesh, size=16, scale=1)
     atlas = unwrapped(mesh, "auto", size=256)
-    put_on(mesh, atlas.unwrappings, to_png(bake(block, atlas.texels, place)))
+    put_on(mesh, atlas.unwrappings, to_png(bake(Block(block), atlas.texels, place)))
     mesh.glb.write(ball.with_name("textured.glb"))
     baked = read_mesh(ball.with_name("textured.glb"))
     before, after = Turntable(mesh, FILM), Turntable(baked, FILM)
-    seen, shown = solid(before, place, block), textured(after, baked)
+    seen, shown = solid(before, place, Block(block)), textured(after, baked)
     pictures = []
     for frame in range(4):
         expected, found = before.picture(frame, seen), after.picture(frame, shown)

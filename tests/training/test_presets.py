@@ -51,6 +51,7 @@ def test_a_few_iterations_of_every_preset_beat_even_grey(
     assert isinstance(scene, SmokeScene)
     loss = AppearanceLoss(vgg, style, config.appearance, config.view.size)
 
+    @torch.no_grad()
     def distance(picture: Tensor, opacity: Tensor) -> float:
         shown = linear_to_srgb(picture).permute(2, 0, 1)[None]
         return float(loss(shown, opacity[None], torch.Generator().manual_seed(0)).total)

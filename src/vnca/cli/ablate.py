@@ -13,12 +13,12 @@ import tyro
 import vnca
 from vnca.cli.options import STDOUT, chosen, parse, print_json
 from vnca.cli.terminal import Terminal, say
-from vnca.core.errors import OptionError
+from vnca.core.errors import GridError, OptionError
 from vnca.core.files import existing_file, whole_file, writable_file
 from vnca.core.volume import Volume
 from vnca.features.load import load_network
 from vnca.io.picture import read_image
-from vnca.io.smoke import SmokeFormat
+from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.metrics.estimators import Estimator, estimators
 from vnca.metrics.motion import (
     MotionMeasures,
@@ -104,6 +104,8 @@ def ablate(options: Ablate) -> None:
         writable_file(options.json)
     seen_by = estimators()
     smoke = _read(options.frame, options.smoke)
+    if smoke.velocity_field is None:
+        raise GridError(f"{missing_velocity(options.frame)}; without one there is nothing to find")
     rules: list[Rule] = []
     found: dict[str, list[MotionMeasures]] = {}
     for variant, config, folder, is_trained in _runs(options, smoke):

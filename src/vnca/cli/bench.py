@@ -230,7 +230,8 @@ def _painted(options: BenchStylize, folder: Path) -> PaintedSequence:
         rule = Model.load(options.model).rule
         sequence = open_sequence(options.sequence, options.frames, Terminal())
         smoke = with_fitted_scale(options.smoke, sequence)
-    return PaintedSequence.read(rule, sequence, smoke, steps=options.steps_per_frame)
+    steps = options.steps_per_frame
+    return PaintedSequence.read(rule, sequence, smoke, steps=steps, tell=Terminal().note)
 
 
 def _table(rows: Rows) -> list[str]:

@@ -20,7 +20,8 @@ from vnca.core.volume import Volume
 from vnca.engine.native.step import default_threads
 from vnca.features.load import load_network
 from vnca.io.picture import read_style
-from vnca.io.smoke import SmokeFormat
+from vnca.io.smoke import SmokeFormat, missing_velocity
+from vnca.io.smoke_format import NO_VELOCITY
 from vnca.recipe.sequence import beside, read_alone
 from vnca.recipe.session import choose_device
 from vnca.simulation.scenes import simulate
@@ -175,7 +176,10 @@ def run_train(arguments: Sequence[str]) -> None:
 
 def _smoke(options: BenchTrain) -> Volume:
     if options.frame is not None:
-        return read_alone(options.frame, beside(options.frame, options.smoke), Terminal())
+        frame = read_alone(options.frame, beside(options.frame, options.smoke), Terminal())
+        if frame.velocity_field is None and options.smoke.velocity_grid != NO_VELOCITY:
+            Terminal().note(f"{missing_velocity(options.frame)}; teaching motion is not timed")
+        return frame
     say("simulating a plume")
     *_, frame = simulate("plume", resolution=options.resolution, frames=_FRAME, seed=0)
     return frame

@@ -28,7 +28,8 @@ from vnca.io.vdb import Grid, Transform, write_vdb
 from vnca.meshes.bake import Placement, bake, to_png
 from vnca.meshes.turntable import Shader, Turntable, TurntableConfig, solid, textured
 from vnca.meshes.unwrap import Unwrap, unwrapped
-from vnca.painting.block import KIND, LARGEST, SMALLEST, grow, sample_block
+from vnca.painting.block import KIND, LARGEST, SMALLEST, Block, grow
+from vnca.painting.parts import require_refinement
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule
 
@@ -89,8 +90,8 @@ def texture_rule(path: Path) -> Rule:
     return model.rule
 
 
-def grown_blocks(rule: Rule, config: BlockConfig, count: int = 1) -> Iterator[FloatArray]:
-    """`count` blocks, linear RGB `[s, s, s, 3]`: the first grown from nothing, and its later life.
+def grown_blocks(rule: Rule, config: BlockConfig, count: int = 1) -> Iterator[Block]:
+    """`count` blocks: the first grown from nothing, and its later life.
 
     Raises:
         BackendUnavailableError: If the kernel cannot run.
@@ -198,7 +199,7 @@ def _bake(options: Bake, rule: Rule, mesh: Mesh, place: Placement) -> None:
 
 def _colour_vertices(options: Bake, rule: Rule, mesh: Mesh, place: Placement) -> None:
     (block,) = grown_blocks(rule, options.grow)
-    colours = [to_srgb8(sample_block(block, place(s.points))) for s in mesh.surfaces]
+    colours = [to_srgb8(block.at(place(s.points))) for s in mesh.surfaces]
     write_coloured(options.out, mesh, colours)
 
 
@@ -214,12 +215,15 @@ class BlockVolume:
     """A model file, or the folder of a training run."""
     out: Path
     """A .vdb file with `density` 1 and `Cd`, a unit wide; or an .npz file with `Cd`."""
+    refine: int = 1
+    """Write a grid so many times as fine as the block's cells, at most 8."""
     grow: BlockConfig = field(default_factory=BlockConfig)
     """How the block is grown."""
 
     def __post_init__(self) -> None:
         if self.out.suffix.lower() not in VOLUMES:
             raise OptionError(f"--out {self.out}: expected a name ending in .vdb or .npz")
+        require_refinement(self.refine)
 
 
 def run_volume(arguments: Sequence[str]) -> None:
@@ -228,7 +232,7 @@ def run_volume(arguments: Sequence[str]) -> None:
     writable_file(options.out)
     (block,) = grown_blocks(texture_rule(options.model), options.grow)
     write = _write_vdb if options.out.suffix.lower() == ".vdb" else _write_npz
-    write(options.out, block)
+    write(options.out, block.refined(options.refine))
     made("block", options.out)
 
 

@@ -13,7 +13,7 @@ from vnca.io.mesh.mesh import Mesh
 from vnca.io.mesh.texture import BaseColour, base_colours
 from vnca.meshes.bake import Placement
 from vnca.meshes.raster import visible
-from vnca.painting.block import sample_block
+from vnca.painting.block import Block
 
 SAMPLES = 2
 """Samples along either side of a pixel."""
@@ -120,10 +120,10 @@ def _vertex_normals(points: AnyArray, faces: AnyArray) -> AnyArray:
     return total[place]
 
 
-def solid(table: Turntable, place: Placement, block: FloatArray) -> Shader:
+def solid(table: Turntable, place: Placement, block: Block) -> Shader:
     """Shows a block of solid texture, as baked at endless resolution."""
     points = table.at(table.points)
-    return lambda triangles, weights: sample_block(block, place(points(triangles, weights)))
+    return lambda triangles, weights: block.at(place(points(triangles, weights)))
 
 
 def textured(table: Turntable, mesh: Mesh) -> Shader:

@@ -23,10 +23,11 @@ from vnca.core.lattice import Lattice
 from vnca.core.volume import Volume
 from vnca.io.provenance import Provenance, read_provenance
 from vnca.io.sequence import Frame, FrameSequence
-from vnca.io.smoke import SmokeFormat, missing_velocity, read_smoke, write_painted
-from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
+from vnca.io.smoke import SmokeFormat, read_smoke, write_painted
+from vnca.io.smoke_format import up_axis_of
 from vnca.painting.ahead import read_ahead
 from vnca.painting.roll import Roll, RollState
+from vnca.painting.still import StillSmoke
 from vnca.painting.unfinished import Source, Unfinished
 
 OnError = Literal["stop", "skip", "hold"]
@@ -64,8 +65,7 @@ class Painter:
         conditions: What else must be the same for a painting to be gone on with: its bytes
             follow from these, the sequence, the rule and nothing else.
         tell: Is given lines for the user.
-        refine: How many times as fine as the smoke's the grid of the painting is; what the roll
-            paints is refined smoke.
+        refine: How many times as fine as the smoke's the grid of the painting is.
         facts: What else files tell of their painting, beside how opaque it is to be seen.
     """
 
@@ -80,7 +80,11 @@ class Painter:
     tell: Callable[[str], None]
     refine: int = 1
     facts: Mapping[str, str | int | float] = field(default_factory=dict)
-    _told: set[str] = field(default_factory=set, init=False)
+    _still: StillSmoke = field(init=False)
+
+    def __post_init__(self) -> None:
+        still = StillSmoke(self.roll.rule, self.smoke, self.tell)
+        object.__setattr__(self, "_still", still)
 
     @property
     def unfinished_path(self) -> Path:
@@ -209,7 +213,7 @@ class Painter:
 
     def _write(self, frame: Frame, read: _Read, state: RollState) -> RollState:
         """Paint smoke to the file of a frame; the state after it."""
-        self._tell_without_velocity(read)
+        self._still.look(read.smoke, read.frame.path)
         painting = self.roll.paint(read.smoke, state)
         if frame == self.sequence[0]:
             # From here on frames of an earlier painting are overwritten, and after an end at any
@@ -221,7 +225,7 @@ class Painter:
             self.smoke,
             density=painting.density_field,
             colour=painting.colour_field,
-            box=read.smoke.box,
+            box=painting.smoke.box,
             lattice=self.lattice,
             colour_grids=self.colour_grids,
             refine=self.refine,
@@ -229,25 +233,12 @@ class Painter:
         )
         return painting.state
 
-    def _tell_without_velocity(self, read: _Read) -> None:
-        """Say once that the rule wants a velocity which a frame does not have."""
-        if (
-            self.roll.rule.config.velocity_prior
-            and self.smoke.velocity_grid != NO_VELOCITY
-            and read.smoke.velocity_field is None
-            and not read.smoke.box.is_empty
-            and "velocity" not in self._told
-        ):
-            self._told.add("velocity")
-            missing = missing_velocity(read.frame.path)
-            self.tell(f"{missing}; frames without are painted as if their smoke rested")
-
     def _provenance(self, read: _Read) -> Provenance:
         """What the painting of a frame tells of itself."""
         scales = self.roll.rule.scales
         return Provenance(
             scales.extinction(read.smoke.cell_length),
-            scales.gamma * self.refine,
+            scales.gamma * self.roll.grid,
             up_axis_of(read.frame.path, self.smoke),
             {**self.facts, MARK: self.mark},
         )
@@ -259,7 +250,7 @@ class Painter:
             source = self._source(at)
             smoke = read_smoke(
                 frame.path, self.smoke, frame=frame.number, lattice=self.lattice
-            ).refined(self.refine)
+            ).refined(self.roll.grid)
         except BROKEN as error:
             return error
         except OSError as error:

@@ -31,16 +31,17 @@ from vnca.recipe.session import (
     choose_device,
     fitting,
     interrupted,
+    rule_like,
     run_folder,
     shown_and_judged,
 )
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule, RuleConfig
+from vnca.rule.rule import Rule
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.memory import memory_budget
 from vnca.training.presets import DEFAULT
 from vnca.training.presets import preset as preset_of
-from vnca.training.pretraining import SHAPE, pretraining_config, without_prior_weights
+from vnca.training.pretraining import pretraining_config, without_prior_weights
 from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 from vnca.training.texture_config import TextureConfig
@@ -224,7 +225,7 @@ def run(
             checkpoint.require(session.inputs, folder.checkpoint_path)
         beginning = pretraining_config(config, trainer.picture_cells)
         if options.init is not None:
-            trainer.begin_with(without_prior_weights(_given(options.init, config.rule)))
+            trainer.begin_with(without_prior_weights(rule_like(options.init, trainer.rule())))
         elif beginning is not None:
             if checkpoint is None and options.overwrite and options.out is not None:
                 # Resuming must not take the texture of the run that was there for this one's.
@@ -252,22 +253,6 @@ def training_inputs(
     if smoke.velocity is not None:
         frame.append(smoke.velocity)
     return fingerprints(style, config, network, frame=frame)
-
-
-def _given(path: Path, wanted: RuleConfig) -> Rule:
-    """The texture to begin with that was named.
-
-    Raises:
-        VncaError: If it cannot be read, or is a rule of another shape.
-    """
-    rule = Model.load(path).rule
-    for name in SHAPE:
-        its, ours = (getattr(config, name) for config in (rule.config, wanted))
-        if its != ours:
-            raise OptionError(
-                f"`init` {path}: was trained with `{name}` {its:g}; add that, in place of {ours:g}"
-            )
-    return rule
 
 
 def _texture(

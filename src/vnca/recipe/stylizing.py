@@ -6,7 +6,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
@@ -19,6 +19,7 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import OnError
 from vnca.painting.roll import Painting
 from vnca.painting.roll import stylize as stylize_volumes
+from vnca.painting.still import StillSmoke
 from vnca.recipe.film import FilmConfig, Shown
 from vnca.recipe.options import changed, distributed
 from vnca.recipe.painting import StylizeRun, read_painted, run, with_scales
@@ -74,7 +75,7 @@ def stylize(
     *,
     out: str | Path | None = None,
     frames: str | None = None,
-    refine: Literal[1, 2, 3, 4] = 1,
+    refine: int = 1,
     colour_grid: str | Sequence[str] = "Cd",
     preview: str | Path | None = None,
     gamma: float | None = None,
@@ -176,10 +177,12 @@ def _in_memory(
         smoke = with_fitted_scale(options.smoke, sequence)
         region = sequence_region(sequence, smoke, watch)
         require_dense_enough(sequence, smoke, rule.scales.density)
-        count, read = len(sequence), volumes(sequence, smoke, region.lattice)
+        still = StillSmoke(rule, smoke, watch.note)
+        count, read = len(sequence), volumes(sequence, smoke, region.lattice, still)
     else:
         laid, region = region_of(given)
-        count, read = len(laid), iter(laid)
+        still = StillSmoke(rule, options.smoke, watch.note)
+        count, read = len(laid), still.watched(laid, [None] * len(laid))
     rule = placed(rule, region, watch)
     paintings = stylize_volumes(
         read,

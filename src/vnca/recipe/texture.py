@@ -23,6 +23,7 @@ from vnca.recipe.session import (
     choose_device,
     fitting,
     interrupted,
+    rule_like,
     run_folder,
     shown_and_judged,
 )
@@ -31,6 +32,7 @@ from vnca.training.checkpoint import Checkpoint, fingerprints
 from vnca.training.memory import memory_budget
 from vnca.training.presets import DEFAULT
 from vnca.training.presets import preset as preset_of
+from vnca.training.pretraining import without_prior_weights
 from vnca.training.texture_config import TextureConfig
 from vnca.training.texture_trainer import texture_trainer
 
@@ -49,6 +51,8 @@ class TextureRun(TrainingOptions):
     """The mesh's up axis; y for OBJ and GLB, z for PLY and STL unless given."""
     preset: str = DEFAULT
     """Values of all hyperparameters that are not given: draft, standard, or a TOML file."""
+    init: Path | None = None
+    """A rule of another picture to start from, which takes a part of the iterations."""
     config: TextureConfig = field(default_factory=TextureConfig)
     """Hyperparameters."""
 
@@ -70,6 +74,7 @@ def texture(
     mesh: str | Path | None = None,
     up_axis: UpAxis | None = None,
     preset: str | Path = DEFAULT,
+    init: str | Path | None = None,
     overwrite: bool = False,
     preview_every: int = 50,
     device: str = "auto",
@@ -86,6 +91,7 @@ def texture(
         mesh: A mesh file to look at, too, while training.
         up_axis: The mesh's; y for OBJ and GLB, z for PLY and STL unless given.
         preset: `draft` takes minutes, `standard` hours; or the path of a TOML file.
+        init: A model of another picture to start from, which takes a part of the iterations.
         overwrite: Replace the run that `out` holds.
         preview_every: Iterations between preview pictures.
         device: `auto`, `cpu` or `cuda`.
@@ -105,6 +111,7 @@ def texture(
         mesh=None if mesh is None else Path(mesh),
         up_axis=up_axis,
         preset=str(preset),
+        init=None if init is None else Path(init),
         overwrite=overwrite,
         preview_every=preview_every,
         device=device,
@@ -145,10 +152,13 @@ def run(
         trainer = texture_trainer(
             style, config, network, mesh=mesh, device=device, memory_budget=budget
         )
+    if options.init is not None and checkpoint is None:
+        trainer.begin_with(without_prior_weights(rule_like(options.init, trainer.rule())))
     training = {
         "kind": KIND,
         "style": options.style.name,
         "mesh": options.mesh.name if options.mesh else None,
+        "init": options.init.name if options.init else None,
         "preset": Path(options.preset).name,
         "block": config.block,
         "seed": config.seed,

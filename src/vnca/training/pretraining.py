@@ -38,8 +38,9 @@ def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | N
         appearance=dataclasses.replace(
             plain.appearance,
             layers=config.appearance.layers,
-            style_scale=picture / plain.slice.size,
+            style_scale=picture / plain.slice.cells,
         ),
+        decoder=config.decoder,
         iterations=iterations,
         features=config.features,
         backend=config.backend,

@@ -15,6 +15,12 @@ class ViewConfig:
 
     size: int = 128
     """Rows and columns of a view, pixels."""
+    pixels_per_cell: float | None = None
+    """Pixels that show a cell: a view then shows a part of the smoke, from as near as that takes;
+    all of the smoke unless given."""
+    supersampling: int = 2
+    """Rays along the rows and the columns of a pixel, where a decoder draws what is finer than
+    pixels."""
     azimuths: tuple[float, ...] = ()
     """Views come from these degrees around the smoke; from all around unless given."""
     elevation: float = 30.0
@@ -33,6 +39,12 @@ class ViewConfig:
     def __post_init__(self) -> None:
         if self.size < 32:
             raise OptionError(f"`view.size` {self.size}: at least 32 pixels are needed")
+        if self.pixels_per_cell is not None and not 0 < self.pixels_per_cell <= 64:
+            raise OptionError(
+                f"`view.pixels_per_cell` {self.pixels_per_cell:g}: must be above 0, at most 64"
+            )
+        if not 1 <= self.supersampling <= 8:
+            raise OptionError(f"`view.supersampling` {self.supersampling}: must be from 1 to 8")
         if not all(-360 <= azimuth <= 360 for azimuth in self.azimuths):
             raise OptionError(
                 f"`view.azimuths` {' '.join(map(str, self.azimuths))}: must be -360 to 360 degrees"

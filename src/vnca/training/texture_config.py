@@ -13,20 +13,31 @@ from vnca.training.config import Pictures, PoolConfig, TrainingConfig
 class SliceConfig:
     """How the block is looked at while training."""
 
-    size: int = 64
-    """Rows and columns of a slice, pixels: cells, but for the zoom."""
-    count: int = 2
+    size: int = 128
+    """Rows and columns of a slice, pixels."""
+    pixels_per_cell: float = 4.0
+    """Pixels that show a cell, but for the zoom."""
+    supersampling: int = 2
+    """Samples along the rows and the columns of a pixel: what is finer than pixels is averaged
+    instead of becoming grain."""
+    count: int = 1
     """Slices in an iteration."""
     oblique: float = 0.5
     """Share of the slices that lie at any angle; the others lie along the axes."""
     zoom: float = 1.1
-    """A pixel shows from 1/zoom to zoom cells."""
+    """A slice shows from 1/zoom to zoom times as much."""
     mesh: float = 0.5
     """Share of the pictures that show the mesh, where there is one."""
 
     def __post_init__(self) -> None:
         if self.size < 32:
             raise OptionError(f"`slice.size` {self.size}: at least 32 pixels are needed")
+        if not 0 < self.pixels_per_cell <= 64:
+            raise OptionError(
+                f"`slice.pixels_per_cell` {self.pixels_per_cell:g}: must be above 0, at most 64"
+            )
+        if not 1 <= self.supersampling <= 8:
+            raise OptionError(f"`slice.supersampling` {self.supersampling}: must be from 1 to 8")
         if self.count < 1:
             raise OptionError(f"`slice.count` {self.count}: at least 1 is needed")
         for name in ("oblique", "mesh"):
@@ -34,6 +45,11 @@ class SliceConfig:
                 raise OptionError(f"`slice.{name}` {getattr(self, name)}: must be from 0 to 1")
         if not 1 <= self.zoom <= 4:
             raise OptionError(f"`slice.zoom` {self.zoom}: must be from 1 to 4")
+
+    @property
+    def cells(self) -> float:
+        """Along the side of a slice."""
+        return self.size / self.pixels_per_cell
 
 
 # A texture is the same everywhere and follows nothing. Only gradients tell a cell where in a
