@@ -220,7 +220,7 @@ def test_standing_smoke_is_painted_alike_while_its_grid_moves(
     seen: dict[str, list[Any]] = {"standing": [], "standing_moved": []}
     for name, frames in seen.items():
         film = tmp_path / f"{name}.gif"
-        size = ("--preview", film, "--film.rows", 32, "--film.columns", 32)
+        size = ("--preview", film, "--rows", 32, "--columns", 32)
         done = vnca("stylize", model, DATA / name, "--out", tmp_path / name, *QUICK, *size)
         assert done.code == 0, done.err
         assert "resampled" not in done.err

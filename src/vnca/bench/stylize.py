@@ -230,7 +230,7 @@ def _painter(painted: PaintedSequence, roll: Roll, folder: Path) -> Painter:
 
 
 def _paint(painter: Painter) -> None:
-    with closing(painter.paint(painter.begin(resume=False))) as paths:
+    with closing(painter.paint(painter.begin(resume=False, overwrite=True))) as paths:
         for _ in paths:
             pass
     painter.discard()

@@ -11,7 +11,7 @@ from vnca.core.typing import AnyArray, FloatArray
 from vnca.io.mesh.mesh import Mesh
 from vnca.io.picture import to_srgb8
 from vnca.meshes.unwrap import TexelMap
-from vnca.painting.block import sample_block
+from vnca.painting.block import Block
 
 
 @dataclass(frozen=True)
@@ -43,14 +43,15 @@ class Placement:
         return (points - self.corner) * self.cells
 
 
-def bake(block: FloatArray, texels: TexelMap, place: Placement) -> FloatArray:
+def bake(block: Block, texels: TexelMap, place: Placement) -> FloatArray:
     """The texture `[size, size, 3]`, linear RGB; texels without a surface blend in."""
     size = texels.size
+    width = texels.width * place.cells
     picture = np.zeros((size * size, 3), np.float32)
     covered = np.zeros(size * size, np.float32)
     for start in range(0, len(texels.texel), 1 << 20):
         part = slice(start, start + (1 << 20))
-        picture[texels.texel[part]] = sample_block(block, place(texels.points[part]))
+        picture[texels.texel[part]] = block.at(place(texels.points[part]), width)
     covered[texels.texel] = 1
     return fill(picture.reshape(size, size, 3), covered.reshape(size, size))
 

@@ -36,12 +36,14 @@ class TexelMap:
         texel: `[n]`, row · size + column.
         points: `[n, 3]`, where on the surface they are, +z up.
         overlap: Share of the covered texels that several faces claim.
+        width: That of a texel on the surface, on average, in lengths of the mesh.
     """
 
     size: int
     texel: IntArray
     points: FloatArray
     overlap: float
+    width: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,10 @@ def texel_map(
         weights = np.clip(weights, -_FARTHEST, _FARTHEST)
         weights[:, 0] = 1 - weights[:, 1] - weights[:, 2]
         points[start : start + (1 << 20)] = np.einsum("nk,nkc->nc", weights, places[faces])
-    return TexelMap(size, texel, points, float(overlap))
+    first, second = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    area = np.linalg.norm(np.cross(first, second), axis=1).sum() / 2
+    width = float(np.sqrt(area / max(inside, 1)))
+    return TexelMap(size, texel, points, float(overlap), width)
 
 
 def _unusable(surfaces: Sequence[Surface]) -> str | None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import vnca
 from vnca.bench.machine import run_facts
@@ -30,6 +30,7 @@ from vnca.metrics.setup import SIZE, Setup
 from vnca.metrics.style import SMALLEST, StyleMetric
 from vnca.metrics.survey import Survey, survey
 from vnca.painting.config import StylizeConfig
+from vnca.painting.parts import require_refinement
 from vnca.painting.roll import stylize
 from vnca.painting.still import StillSmoke
 from vnca.painting.thin import require_dense
@@ -63,8 +64,8 @@ class EvaluateRun:
     style_scale: float | None = None
     """Shorter side of the picture relative to the views; as many cells as in the training unless
     given."""
-    refine: Literal[1, 2, 3, 4] = 1
-    """Paint on a grid so many times as fine as that of the smoke."""
+    refine: int = 1
+    """Paint on a grid so many times as fine as that of the smoke, at most 8."""
     density_scale: float | None = None
     """Density that counts as 1; that of the training frame unless given."""
     size: int = SIZE
@@ -78,6 +79,7 @@ class EvaluateRun:
 
     def __post_init__(self) -> None:
         Compute(self.backend)
+        require_refinement(self.refine)
         if self.density_scale is not None and not 0 < self.density_scale < math.inf:
             raise OptionError(f"`density_scale` {self.density_scale}: must be positive")
         if self.size < 64:
@@ -127,7 +129,7 @@ def evaluate(
     out: str | Path | None = None,
     frames: str | None = None,
     style_scale: float | None = None,
-    refine: Literal[1, 2, 3, 4] = 1,
+    refine: int = 1,
     density_scale: float | None = None,
     size: int = SIZE,
     backend: str = "auto",
@@ -254,7 +256,8 @@ def run(
     )
     paintings = tracked(paintings, watch, "painting and measuring", given.count, "frames")
     judges = _judges(model, metric, options.size)
-    found = survey(paintings, given.count, rule.refined(refine), setup, metric, judges)
+    cells = 1 if rule.decoder is not None else refine
+    found = survey(paintings, given.count, rule.refined(cells), setup, metric, judges)
     listed = measures(found)
     watch.note(f"trained with features '{model.training.get('features', 'unknown')}'")
     if out is None:

@@ -6,7 +6,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
@@ -76,7 +76,7 @@ def stylize(
     *,
     out: str | Path | None = None,
     frames: str | None = None,
-    refine: Literal[1, 2, 3, 4] = 1,
+    refine: int = 1,
     colour_grid: str | Sequence[str] = "Cd",
     preview: str | Path | None = None,
     gamma: float | None = None,
@@ -84,6 +84,7 @@ def stylize(
     backend: str = "auto",
     precision: str = "float32",
     resume: bool = False,
+    overwrite: bool = False,
     on_error: OnError = "stop",
     film: FilmConfig | Mapping[str, Any] | None = None,
     watch: Watch = SILENT,
@@ -107,6 +108,8 @@ def stylize(
         backend: What computes the automaton.
         precision: What the native kernel rounds the factors of its products to.
         resume: Go on with a painting in `out` that was ended early.
+        overwrite: Replace painted frames that `out` holds; with `resume`, where those are of
+            another painting.
         on_error: With a file that cannot be read: `stop`, `skip` it, or `hold` the frame before.
         film: How the preview is filmed: a `FilmConfig`, or some of its fields.
         watch: Is told how far it has come, and may cancel.
@@ -136,6 +139,7 @@ def stylize(
         backend=backend,
         precision=precision,
         resume=resume,
+        overwrite=overwrite,
         on_error=on_error,
         smoke=smoke,
         config=config,
@@ -145,7 +149,7 @@ def stylize(
         if not isinstance(sequence, (str, Path)):
             raise OptionError("`out`: volumes have no files to be painted beside; leave it out")
         return _from_files(asked, run(asked, watch, model))
-    for option in ("preview", "resume"):
+    for option in ("preview", "resume", "overwrite"):
         if getattr(asked, option):
             raise OptionError(f"`{option}`: needs a folder for the painting as `out`")
     if isinstance(sequence, (str, Path)):
