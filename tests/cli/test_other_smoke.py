@@ -26,10 +26,11 @@ QUICK = ("--warmup", 2, "--steps-per-frame", 1)
 
 @pytest.fixture
 def paint(vnca: Vnca, model: Path, smoke: Path, tmp_path: Path) -> Callable[..., Any]:
-    """Paints the three frames of smoke into the folder `out`."""
+    """Paints the three frames of smoke into the folder `out`, over what is there."""
+    command = ("stylize", model, smoke, "--out", tmp_path / "out", "--overwrite", *QUICK)
 
     def run(*options: object) -> Any:
-        return vnca("stylize", model, smoke, "--out", tmp_path / "out", *QUICK, *options)
+        return vnca(*command, *options)
 
     return run
 
