@@ -1,7 +1,7 @@
 """Smoke that is other than a rule expects it: velocity missing, densities in another unit."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.core.errors import OptionError
+from vnca.core.errors import OptionError, SequenceError
 from vnca.core.volume import Volume
 from vnca.core.watch import Silent
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
+from vnca.painting.roll import Painting
+from vnca.recipe.evaluation import evaluate
 from vnca.recipe.stylizing import stylize
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.smoke_config import SmokeConfig
@@ -24,10 +26,11 @@ QUICK = ("--warmup", 2, "--steps-per-frame", 1)
 
 @pytest.fixture
 def paint(vnca: Vnca, model: Path, smoke: Path, tmp_path: Path) -> Callable[..., Any]:
-    """Paints the three frames of smoke into the folder `out`."""
+    """Paints the three frames of smoke into the folder `out`, over what is there."""
+    command = ("stylize", model, smoke, "--out", tmp_path / "out", "--overwrite", *QUICK)
 
     def run(*options: object) -> Any:
-        return vnca("stylize", model, smoke, "--out", tmp_path / "out", *QUICK, *options)
+        return vnca(*command, *options)
 
     return run
 
@@ -79,33 +82,50 @@ def test_velocity_that_frames_lack_is_missed_once(
     assert ": no velocity" not in paint().err
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("evaluate", "{model}", "{smoke}", "--style", "{style}", "--size", 64, "--style-scale", 1),
-        (
-            *("bench", "stylize", "--model", "{model}", "--sequence", "{smoke}", "--repeats", 1),
-            *("--backends", "numpy", "--threads", 1),
-        ),
-    ],
-    ids=["evaluate", "bench"],
+EVALUATE = (
+    *("evaluate", "{model}", "{smoke}", "--style", "{style}", "--size", 64, "--style-scale", 1),
+    *QUICK,
 )
+BENCH = (
+    *("bench", "stylize", "--model", "{model}", "--sequence", "{smoke}", "--repeats", 1),
+    *("--backends", "numpy", "--threads", 1, *QUICK[2:]),
+)
+
+
+@pytest.fixture
+def measure(
+    vnca: Vnca, monkeypatch: pytest.MonkeyPatch, model: Path, smoke: Path, style: Path
+) -> Callable[..., Any]:
+    """Measures the painting of the three frames, by one of those commands.
+
+    Of an evaluation it paints what would be measured, and gives up; the outcome is all the same
+    that of success.
+    """
+
+    def painted(paintings: Iterable[Painting], *_: object) -> None:
+        assert len([*paintings]) == 3
+        raise OptionError("painted")
+
+    monkeypatch.setattr("vnca.recipe.evaluation.survey", painted)
+    monkeypatch.setattr("vnca.recipe.evaluation._judges", lambda *_: [])
+
+    def run(command: tuple[object, ...], *options: object) -> Any:
+        filled = [str(word).format(model=model, smoke=smoke, style=style) for word in command]
+        outcome = vnca(*filled, *options)
+        return outcome._replace(code=0) if outcome.err.endswith("vnca: painted\n") else outcome
+
+    return run
+
+
+@pytest.mark.parametrize("command", [EVALUATE, BENCH], ids=["evaluate", "bench"])
 def test_who_measures_painting_misses_velocity_too(
-    vnca: Vnca,
-    monkeypatch: pytest.MonkeyPatch,
-    model: Path,
-    smoke: Path,
-    style: Path,
-    command: tuple[object, ...],
+    measure: Callable[..., Any], smoke: Path, command: tuple[object, ...]
 ) -> None:
-    monkeypatch.setattr("vnca.metrics.survey.MOTION_SIZE", 40)
     for number in (2, 3):
         rename_velocity(smoke / f"ball_{number:04d}.vdb", "wind")
-    filled = [str(word).format(model=model, smoke=smoke, style=style) for word in command]
-    steps = QUICK[2:] if command[0] == "bench" else QUICK
 
     def told(*options: object) -> list[str]:
-        outcome = vnca(*filled, *steps, *options)
+        outcome = measure(command, *options)
         assert outcome.code == 0, outcome.err
         return [line for line in outcome.err.splitlines() if ": no velocity" in line]
 
@@ -133,7 +153,7 @@ def test_a_timed_training_misses_velocity_too(
     def far_enough(*_: object, **__: object) -> None:
         raise OptionError("far enough")
 
-    monkeypatch.setattr("vnca.cli.bench_train.measure_training", far_enough)
+    monkeypatch.setattr("vnca.cli.bench_torch.measure_training", far_enough)
     command = ("bench", "train", "--frame", frame, "--style", style, "--device", "cpu")
     lines = vnca(*command).err.splitlines()
     missing = f"{frame}: no velocity in this frame; choose with --velocity-grid from wind"
@@ -216,6 +236,30 @@ def test_densities_in_another_unit_are_not_painted_white(
     assert not (tmp_path / "out").exists()
     assert paint(*options, option, value).code == 0
     assert len({colours(path) for path in (tmp_path / "out").iterdir()}) == 3
+
+
+@pytest.mark.parametrize("command", [EVALUATE, BENCH], ids=["evaluate", "bench"])
+def test_who_measures_painting_refuses_densities_in_another_unit_too(
+    measure: Callable[..., Any], smoke: Path, command: tuple[object, ...]
+) -> None:
+    scale_density(smoke, 1e-4)
+    complaint = measure(command).complaint
+    assert f"{smoke}: nothing would be painted" in complaint
+    option, value = complaint.rpartition("try ")[2].split()
+    assert option == "--density-scale"
+    assert float(value) == pytest.approx(densest(smoke), rel=0.01)
+    outcome = measure(command, option, value)
+    assert outcome.code == 0, outcome.err
+    assert "--density-scale 0.0: must be" in measure(command, option, 0).complaint
+
+
+def test_volumes_too_thin_for_the_model_are_refused(model: Path, tiny_smoke: Volume) -> None:
+    thin = replace(tiny_smoke, density=tiny_smoke.density * np.float32(1e-4))
+    with pytest.raises(SequenceError, match=r"^`sequence`: nothing would be painted.*try `density"):
+        list(stylize(model, [thin]))
+    with pytest.raises(SequenceError, match=r"^`sequence`: nothing would be painted"):
+        evaluate(model, thin, style=np.random.default_rng(0).random((40, 40, 3)), style_scale=1)
+    assert len(list(stylize(model, [thin], density_scale=1e-4, warmup=2, steps_per_frame=1))) == 1
 
 
 def test_a_sequence_may_begin_with_faint_empty_or_broken_frames(

@@ -27,6 +27,7 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import Painter
 from vnca.painting.roll import Roll
 from vnca.painting.still import StillSmoke
+from vnca.painting.thin import require_dense
 from vnca.rule.rule import Rule, RuleConfig, Scales
 from vnca.simulation.scenes import simulate
 
@@ -76,11 +77,13 @@ class PaintedSequence:
             tell: Is given a line if the rule wants a velocity that a frame does not have.
 
         Raises:
-            VncaError: If a frame cannot be read.
+            VncaError: If a frame cannot be read, or nothing would be painted.
         """
         frames = (read_smoke(f.path, smoke, frame=f.number) for f in sequence)
         still = StillSmoke(rule, smoke, tell)
         volumes = list(on_one_lattice(still.watched(frames, [f.path for f in sequence])))
+        densities = (volume.density_field.values for volume in volumes)
+        require_dense(densities, rule.scales.density, str(sequence[0].path.parent))
         config = StylizeConfig(steps_per_frame=steps, warmup=0)
         return cls(rule, sequence, smoke, volumes, config)
 

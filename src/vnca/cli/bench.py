@@ -3,6 +3,7 @@
 `vnca bench stylize` is here, and runs without torch.
 """
 
+import math
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -168,6 +169,8 @@ class BenchStylize(Tables):
     """Frames of the simulated plume."""
     hidden: int = 96
     """Hidden units of the random rule."""
+    density_scale: float | None = None
+    """Density that counts as 1; the model's unless given."""
     steps_per_frame: int | None = None
     """Steps of the automaton in each frame; the rule's own unless given."""
     backends: tuple[str, ...] = ()
@@ -187,6 +190,8 @@ class BenchStylize(Tables):
                 raise OptionError(f"--{name} {getattr(self, name)}: at least 1 is needed")
         if self.steps_per_frame is not None and self.steps_per_frame < 1:
             raise OptionError(f"--steps-per-frame {self.steps_per_frame}: at least 1 is needed")
+        if self.density_scale is not None and not 0 < self.density_scale < math.inf:
+            raise OptionError(f"--density-scale {self.density_scale}: must be positive")
         if (self.model is None) != (self.sequence is None):
             raise OptionError("--model and --sequence: give both or neither")
         if not set(self.backends) <= set(BACKENDS):
@@ -227,7 +232,7 @@ def _painted(options: BenchStylize, folder: Path) -> PaintedSequence:
         sequence = simulated(folder, resolution=options.resolution, frames=options.length)
         smoke = SmokeFormat()
     else:
-        rule = Model.load(options.model).rule
+        rule = Model.load(options.model).rule.rescaled(density=options.density_scale)
         sequence = open_sequence(options.sequence, options.frames, Terminal())
         smoke = with_fitted_scale(options.smoke, sequence)
     steps = options.steps_per_frame

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
@@ -32,6 +33,7 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.parts import require_refinement
 from vnca.painting.roll import stylize
 from vnca.painting.still import StillSmoke
+from vnca.painting.thin import require_dense
 from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY, PICTURE_CELLS, loaded, recorded_smoke
 from vnca.recipe.sequence import open_sequence, placed, region_of, sequence_region, volumes
@@ -64,6 +66,8 @@ class EvaluateRun:
     given."""
     refine: int = 1
     """Paint on a grid so many times as fine as that of the smoke, at most 8."""
+    density_scale: float | None = None
+    """Density that counts as 1; that of the training frame unless given."""
     size: int = SIZE
     """Rows and columns of the views, pixels."""
     backend: str = "auto"
@@ -76,6 +80,8 @@ class EvaluateRun:
     def __post_init__(self) -> None:
         Compute(self.backend)
         require_refinement(self.refine)
+        if self.density_scale is not None and not 0 < self.density_scale < math.inf:
+            raise OptionError(f"`density_scale` {self.density_scale}: must be positive")
         if self.size < 64:
             raise OptionError(f"`size` {self.size}: at least 64 pixels are needed")
         if self.style_scale is not None:
@@ -124,6 +130,7 @@ def evaluate(
     frames: str | None = None,
     style_scale: float | None = None,
     refine: int = 1,
+    density_scale: float | None = None,
     size: int = SIZE,
     backend: str = "auto",
     watch: Watch = SILENT,
@@ -142,6 +149,7 @@ def evaluate(
         style_scale: Shorter side of the picture relative to the views; as many cells as in the
             training unless given.
         refine: Paint on a grid so many times as fine as the smoke's.
+        density_scale: Density that counts as 1; that of the training frame unless given.
         size: Rows and columns of the views, pixels.
         backend: What computes the automaton.
         watch: Is told how far it has come, and may cancel.
@@ -167,6 +175,7 @@ def evaluate(
         style=Path(style) if isinstance(style, (str, Path)) else None,
         style_scale=style_scale,
         refine=refine,
+        density_scale=density_scale,
         size=size,
         backend=backend,
         smoke=smoke,
@@ -183,7 +192,12 @@ def evaluate(
     def read(still: StillSmoke | None) -> Iterator[Volume]:
         return iter(given) if still is None else still.watched(given, [None] * len(given))
 
-    return run(asked, model, watch, _Smoke(region, len(given), read, "volumes in memory", "memory"))
+    return run(
+        asked,
+        model,
+        watch,
+        _Smoke(region, len(given), read, "volumes in memory", "memory", "`sequence`"),
+    )
 
 
 @dataclass(frozen=True)
@@ -198,6 +212,7 @@ class _Smoke:
     read: Callable[[StillSmoke | None], Iterator[Volume]]
     first: str
     folder: str
+    where: str
 
 
 def run(
@@ -223,7 +238,10 @@ def run(
     if sequence is not None:
         given = _files(sequence, options, watch)
     assert given is not None, "it was given, or else there is a sequence"
-    rule = placed(model.rule, given.region, watch)
+    rule = model.rule.rescaled(density=options.density_scale)
+    densities = (smoke.density_field.values for smoke in given.read(None))
+    require_dense(densities, rule.scales.density, given.where)
+    rule = placed(rule, given.region, watch)
     refine = options.refine
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.
     setup = Setup.around(given.read(None), rule, options.size).refined(refine)
@@ -263,7 +281,8 @@ def _files(sequence: FrameSequence, options: EvaluateRun, watch: Watch) -> _Smok
     def read(still: StillSmoke | None) -> Iterator[Volume]:
         return volumes(sequence, at_rest if still is None else smoke, region.lattice, still)
 
-    return _Smoke(region, len(sequence), read, first.name, first.resolve().parent.name)
+    folder = first.resolve().parent.name
+    return _Smoke(region, len(sequence), read, first.name, folder, str(first.parent))
 
 
 def _facts(options: EvaluateRun, model: Model, found: Survey, smoke: _Smoke) -> Mapping[str, str]:
@@ -280,7 +299,12 @@ def _facts(options: EvaluateRun, model: Model, found: Survey, smoke: _Smoke) -> 
         ),
         "measured": f"by vnca {vnca.__version__}, {run_facts('cpu', 1)['date']} UTC, "
         f"at {options.size}×{options.size} pixels"
-        + (f", painted on a grid {options.refine} times as fine" if options.refine > 1 else ""),
+        + (f", painted on a grid {options.refine} times as fine" if options.refine > 1 else "")
+        + (
+            f", with a density scale of {options.density_scale:g}"
+            if options.density_scale is not None
+            else ""
+        ),
     }
 
 

@@ -101,16 +101,6 @@ class StylizeRun:
             )
 
 
-def with_scales(options: StylizeRun, rule: Rule) -> Rule:
-    """The rule with the density that counts as 1, and the γ, that are asked for."""
-    scales = dataclasses.replace(
-        rule.scales,
-        density=options.density_scale or rule.scales.density,
-        gamma=options.gamma or rule.scales.gamma,
-    )
-    return dataclasses.replace(rule, scales=scales)
-
-
 def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterator[Path | None]:
     """Make ready to paint as asked; memory does not grow with the length of the sequence.
 
@@ -127,7 +117,7 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
         VncaError: If an input cannot be used or the output cannot be written.
     """
     model = model or Model.load(options.model)
-    rule = with_scales(options, model.rule)
+    rule = model.rule.rescaled(density=options.density_scale, gamma=options.gamma)
     sequence = open_sequence(options.sequence, options.frames, watch)
     writable_folder(options.out)
     if options.preview:

@@ -1,6 +1,7 @@
 """A sequence of smoke in files: its frames, gaps, its box, volumes read ahead."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial, reduce
 from itertools import product
@@ -12,7 +13,7 @@ from vnca.core.camera import world_box
 from vnca.core.errors import SequenceError
 from vnca.core.files import existing_file
 from vnca.core.lattice import Lattice, Placement, Region
-from vnca.core.typing import AnyArray, Box
+from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.core.watch import Watch
 from vnca.io.orientation import on_lattice, on_one_lattice
@@ -22,7 +23,8 @@ from vnca.io.smoke_format import NO_VELOCITY, Extent
 from vnca.painting.ahead import read_ahead
 from vnca.painting.painter import BROKEN
 from vnca.painting.still import StillSmoke
-from vnca.rule.rule import SMOKE_THRESHOLD, Rule, density_scale
+from vnca.painting.thin import require_dense
+from vnca.rule.rule import Rule
 
 
 def open_sequence(pattern: str | Path, frames: str | None, watch: Watch) -> FrameSequence:
@@ -135,25 +137,13 @@ def require_dense_enough(sequence: FrameSequence, smoke: SmokeFormat, scale: flo
         SequenceError: If no frame holds a cell that counts as smoke.
     """
     smoke = replace(smoke, velocity_grid=NO_VELOCITY)
-    most, typical, is_read = 0.0, 0.0, False
+    require_dense(_densities(sequence, smoke), scale, str(sequence[0].path.parent))
+
+
+def _densities(sequence: FrameSequence, smoke: SmokeFormat) -> Iterator[FloatArray]:
     for frame in sequence:
-        try:
-            density = read_smoke(frame.path, smoke).density_field.values
-        except BROKEN:
-            continue
-        is_read = True
-        most = max(most, float(density.max(initial=0)))
-        if most > SMOKE_THRESHOLD * scale:
-            return
-        if density.any():
-            typical = max(typical, density_scale(density))
-    if is_read:
-        raise SequenceError(
-            f"{sequence[0].path.parent}: nothing would be painted, as the greatest density of all "
-            f"frames, {most:.3g}, is below {SMOKE_THRESHOLD:.0%} of the one that counts as 1, "
-            f"{scale:.3g}; "
-            + (f"try `density_scale` {typical:.3g}" if most else "choose others with `frames`")
-        )
+        with suppress(*BROKEN):
+            yield read_smoke(frame.path, smoke).density_field.values
 
 
 def _covered(extent: Extent, lattice: Lattice, what: str) -> tuple[Box, bool]:

@@ -20,9 +20,10 @@ from vnca.painting.painter import OnError
 from vnca.painting.roll import Painting
 from vnca.painting.roll import stylize as stylize_volumes
 from vnca.painting.still import StillSmoke
+from vnca.painting.thin import require_dense
 from vnca.recipe.film import FilmConfig, Shown
 from vnca.recipe.options import changed, distributed
-from vnca.recipe.painting import StylizeRun, read_painted, run, with_scales
+from vnca.recipe.painting import StylizeRun, read_painted, run
 from vnca.recipe.recorded import IN_MEMORY, loaded, recorded_smoke
 from vnca.recipe.sequence import (
     open_sequence,
@@ -171,7 +172,7 @@ def _in_memory(
     options: StylizeRun, model: Model, given: Sequence[Volume] | None, watch: Watch
 ) -> Iterator[PaintedFrame]:
     """What paints a sequence of files, or volumes, and keeps nothing."""
-    rule = with_scales(options, model.rule)
+    rule = model.rule.rescaled(density=options.density_scale, gamma=options.gamma)
     if given is None:
         sequence = open_sequence(options.sequence, options.frames, watch)
         smoke = with_fitted_scale(options.smoke, sequence)
@@ -181,6 +182,8 @@ def _in_memory(
         count, read = len(sequence), volumes(sequence, smoke, region.lattice, still)
     else:
         laid, region = region_of(given)
+        densities = (volume.density_field.values for volume in laid)
+        require_dense(densities, rule.scales.density, "`sequence`")
         still = StillSmoke(rule, options.smoke, watch.note)
         count, read = len(laid), still.watched(laid, [None] * len(laid))
     rule = placed(rule, region, watch)

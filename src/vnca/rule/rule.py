@@ -165,6 +165,13 @@ class Rule:
         weights = Weights(self.hidden, self.bias, self.output)
         return Automaton(weights, filters, self.config.update_probability, seed)
 
+    def rescaled(self, *, density: float | None = None, gamma: float | None = None) -> "Rule":
+        """The rule with another density that counts as 1, or γ; what is None stays."""
+        scales = replace(
+            self.scales, density=density or self.scales.density, gamma=gamma or self.scales.gamma
+        )
+        return replace(self, scales=scales)
+
     def refined(self, factor: int) -> "Rule":
         """The rule for cells `factor` times as fine, where it does in a step what it did before.
 
