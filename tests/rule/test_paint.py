@@ -8,9 +8,8 @@ import pytest
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import BackendUnavailableError
 from vnca.core.typing import FloatArray
-from vnca.engine.domain import Border, Domain
+from vnca.engine.domain import Border, Domain, subdivided
 from vnca.engine.native import step as native
-from vnca.engine.subdivision import subdivided
 from vnca.rule.decoder import Decoder
 from vnca.rule.paint import Between, colours, density_factors
 from vnca.rule.rule import Rule, RuleConfig, Scales

@@ -8,7 +8,7 @@ from typing import Any, TypeVar, get_args
 
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
-from vnca.bench.records import append_csv, write_json
+from vnca.bench.measurement import append_csv, write_json
 from vnca.cli.options import STDOUT, parse, print_json
 from vnca.core.errors import OptionError
 from vnca.core.files import writable_file

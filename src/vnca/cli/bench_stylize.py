@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from vnca.bench.machine import run_facts
+from vnca.bench.measurement import run_facts
 from vnca.bench.stylize import (
     BACKENDS,
     PaintedSequence,
@@ -21,9 +21,8 @@ from vnca.cli.bench_options import Rows, Tables, parse_bench, short
 from vnca.cli.options import say
 from vnca.cli.watch import Terminal
 from vnca.core.errors import OptionError
-from vnca.engine.backend import choose
 from vnca.engine.native.step import default_threads
-from vnca.engine.session import Compute
+from vnca.engine.session import Compute, choose
 from vnca.io.smoke import SmokeFormat, with_fitted_scale
 from vnca.recipe.sequence import open_sequence
 from vnca.rule.model import Model

@@ -10,7 +10,7 @@ import torch
 import tyro
 
 from vnca.bench.contenders import available, require
-from vnca.bench.machine import run_facts
+from vnca.bench.measurement import run_facts
 from vnca.bench.train import Training, measure_training
 from vnca.cli.bench_options import Rows, Tables, parse_bench, short
 from vnca.cli.demo import STYLE

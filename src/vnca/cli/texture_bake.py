@@ -15,10 +15,9 @@ from vnca.core.errors import OptionError
 from vnca.core.files import whole_file, writable_file
 from vnca.io.mesh.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import put_on, write_coloured
-from vnca.io.orientation import UpAxis
 from vnca.io.picture import to_srgb8
-from vnca.meshes.bake import Placement, bake, to_png
-from vnca.meshes.unwrap import Unwrap, unwrapped
+from vnca.io.smoke_format import UpAxis
+from vnca.meshes.atlas import Placement, Unwrap, bake, to_png, unwrapped
 from vnca.painting.block import sample_block
 from vnca.rule.rule import Rule
 

@@ -16,10 +16,10 @@ from vnca.core.files import writable_file
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.film import FilmWriter
 from vnca.io.mesh.mesh import Mesh, read_mesh
-from vnca.io.orientation import UpAxis
 from vnca.io.picture import SUFFIXES as PICTURES
 from vnca.io.picture import write_image
-from vnca.meshes.bake import Placement
+from vnca.io.smoke_format import UpAxis
+from vnca.meshes.atlas import Placement
 from vnca.meshes.turntable import Shader, Turntable, TurntableConfig, solid, textured
 
 

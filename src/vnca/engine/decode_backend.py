@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 from vnca.core.errors import BackendUnavailableError
 from vnca.core.typing import FloatArray
-from vnca.engine.backend import choose
-from vnca.engine.session import Compute
+from vnca.engine.session import Compute, choose
 
 
 def torch_decode(

@@ -20,8 +20,8 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
-from vnca.core.bricks.field import Field
 from vnca.core.errors import FileFormatError, GridError
+from vnca.core.field import Field
 from vnca.core.files import existing_file
 from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.io.smoke_format import (

@@ -6,16 +6,23 @@ from pathlib import Path
 
 import numpy as np
 
-from vnca.core.bricks.field import Field
-from vnca.core.bricks.refinement import divided
 from vnca.core.errors import GridError, OptionError, OutputError, ShapeError
+from vnca.core.field import Field, divided
 from vnca.core.lattice import Lattice, Placement
 from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume, refined_transform
 from vnca.io.npz import read_npz_smoke
-from vnca.io.orientation import UpAxis, on_lattice, own_cells, upright_world
 from vnca.io.provenance import Provenance, without_provenance
-from vnca.io.smoke_format import CELLS_PER_FRAME, UNITS_METADATA, SmokeFormat, up_axis_of
+from vnca.io.smoke_format import (
+    CELLS_PER_FRAME,
+    UNITS_METADATA,
+    SmokeFormat,
+    UpAxis,
+    on_lattice,
+    own_cells,
+    up_axis_of,
+    upright_world,
+)
 from vnca.io.vdb import VALUE_TYPES, Entry, Grid, GridHeader, Transform, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density

@@ -11,17 +11,25 @@ from statistics import median
 
 import numpy as np
 
-from vnca.core.bricks.field import Field
 from vnca.core.errors import FileFormatError, GridError, OptionError, SequenceError
+from vnca.core.field import Field
 from vnca.core.files import existing_file
 from vnca.core.lattice import Lattice, Placement
 from vnca.core.typing import AnyArray, Box
 from vnca.core.volume import Volume
 from vnca.io.npz import npz_smoke_extent, read_npz_smoke, where_npz_velocity_is
-from vnca.io.orientation import on_lattice, own_cells, upright_world
 from vnca.io.painted import write_painted, write_smoke
 from vnca.io.sequence import Frame
-from vnca.io.smoke_format import Extent, SmokeFormat, StoredSmoke, StoredVelocity, up_axis_of
+from vnca.io.smoke_format import (
+    Extent,
+    SmokeFormat,
+    StoredSmoke,
+    StoredVelocity,
+    on_lattice,
+    own_cells,
+    up_axis_of,
+    upright_world,
+)
 from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_extent, where_vdb_velocity_is
 from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
 

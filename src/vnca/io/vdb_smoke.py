@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vnca.core.bricks.field import Field
-from vnca.core.bricks.places import bricks_beside, sorted_bricks
+from vnca.core.bricks import bricks_beside, sorted_bricks
 from vnca.core.errors import FileFormatError, GridError
+from vnca.core.field import Field
 from vnca.core.typing import Box, IntArray
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
@@ -21,8 +21,7 @@ from vnca.io.smoke_format import (
     upper_grown,
 )
 from vnca.io.vdb import EMPTY_BOX, Grid, GridHeader, Transform, VdbFile, open_vdb
-from vnca.io.vdb_grids import components, listed_vectors, velocity_headers
-from vnca.io.vdb_velocity import resampled_velocity
+from vnca.io.vdb_velocity import components, listed_vectors, resampled_velocity, velocity_headers
 
 _CELL_TOLERANCE = 1e-3
 # A small file may hold 512³ cells, in tiles or packed well, one of 500 KB 2³¹.

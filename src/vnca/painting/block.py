@@ -6,9 +6,8 @@ import numpy as np
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import AnyArray, FloatArray
-from vnca.engine.backend import open_session
 from vnca.engine.domain import Domain
-from vnca.engine.session import Compute
+from vnca.engine.session import Compute, open_session
 from vnca.rule.paint import colours
 from vnca.rule.rule import PRIORS, Rule
 

@@ -15,12 +15,12 @@ from vnca.core.files import existing_file, writable_file
 from vnca.core.typing import FloatArray
 from vnca.core.watch import SILENT, Watch, tracked
 from vnca.io.film import SUFFIXES as FILMS
+from vnca.io.film import contact_sheet
 from vnca.io.painted import read_colour
 from vnca.io.picture import SUFFIXES as PICTURES
 from vnca.io.picture import write_image
 from vnca.io.provenance import read_provenance
 from vnca.io.sequence import FrameSequence
-from vnca.io.sheet import contact_sheet
 from vnca.io.smoke import SmokeFormat
 from vnca.io.smoke_format import NO_VELOCITY
 from vnca.recipe.film import Bounds, Film, FilmConfig, Shown, parse_colour, picture

@@ -15,10 +15,9 @@ from vnca.core.lattice import Lattice, Placement, Region
 from vnca.core.typing import AnyArray, Box
 from vnca.core.volume import Volume
 from vnca.core.watch import Watch
-from vnca.io.orientation import on_lattice, on_one_lattice
 from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
-from vnca.io.smoke_format import NO_VELOCITY, Extent
+from vnca.io.smoke_format import NO_VELOCITY, Extent, on_lattice, on_one_lattice
 from vnca.painting.ahead import read_ahead
 from vnca.painting.painter import BROKEN
 from vnca.rule.rule import SMOKE_THRESHOLD, Rule, density_scale

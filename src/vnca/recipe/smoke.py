@@ -15,10 +15,9 @@ from vnca.core.volume import Volume
 from vnca.core.watch import SILENT, Watch
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
-from vnca.io.orientation import on_lattice
 from vnca.io.picture import read_style, style_array
 from vnca.io.smoke import SmokeFormat, missing_velocity
-from vnca.io.smoke_format import NO_VELOCITY
+from vnca.io.smoke_format import NO_VELOCITY, on_lattice
 from vnca.recipe import texture
 from vnca.recipe.options import distributed, named
 from vnca.recipe.recorded import IN_MEMORY, load

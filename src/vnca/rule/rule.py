@@ -8,9 +8,8 @@ import numpy as np
 from vnca.core.errors import OptionError, ShapeError
 from vnca.core.lattice import Region
 from vnca.core.typing import FloatArray
-from vnca.engine.automaton import Automaton, Weights
+from vnca.engine.automaton import FILTERS, Automaton, Weights, stencil
 from vnca.engine.domain import DomainKind
-from vnca.engine.stencil import FILTERS, stencil
 from vnca.rule.decoder import Decoder
 
 PRIORS = 7

@@ -1,9 +1,11 @@
 """GLB files: binary glTF 2.0, as its JSON document and one block of bytes.
 
 The document stays the JSON it was in the file: whatever is not understood here (animations,
-skins, lights, extensions, extras) is written back as it came.
+skins, lights, extensions, extras) is written back as it came. Meshes that Draco
+compressed are made plain.
 
-Reference: Khronos glTF 2.0 specification, sections 3.6 (accessors) and 4 (GLB).
+Reference: Khronos glTF 2.0 specification, sections 3.6 (accessors) and 4 (GLB); glTF extension
+KHR_draco_mesh_compression.
 """
 
 import base64
@@ -15,7 +17,7 @@ from urllib.parse import unquote_to_bytes
 
 import numpy as np
 
-from vnca.core.errors import FileFormatError
+from vnca.core.errors import BackendUnavailableError, FileFormatError
 from vnca.core.files import existing_file, whole_file
 from vnca.core.typing import AnyArray
 
@@ -26,6 +28,7 @@ _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 DAMAGE = (KeyError, TypeError, AttributeError, ValueError, IndexError, OverflowError)
 """What using a document raises whose JSON holds other things than glTF says."""
 _MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+EXTENSION = "KHR_draco_mesh_compression"
 
 
 class Glb:
@@ -312,3 +315,66 @@ class Glb:
             for entry in self.document.get("bufferViews", []):
                 entry.get("extensions", {}).pop(name, None)
             self.drop_extension(name)
+
+
+def decompress(glb: Glb) -> None:
+    """Put plain vertices and faces in place of compressed ones, in a document.
+
+    Where the file holds plain ones too, those are kept.
+
+    Raises:
+        FileFormatError: If what is compressed cannot be read.
+        BackendUnavailableError: If DracoPy is needed and not installed.
+    """
+    try:
+        for mesh in glb.document.get("meshes", []):
+            for primitive in mesh["primitives"]:
+                compressed = primitive.get("extensions", {}).pop(EXTENSION, None)
+                if compressed is None:
+                    continue
+                stored = [primitive["attributes"][name] for name in compressed["attributes"]]
+                if not all("bufferView" in glb.item("accessors", each) for each in stored):
+                    _decompress(glb, primitive, compressed)
+                if not primitive["extensions"]:
+                    del primitive["extensions"]
+        glb.drop_extension(EXTENSION)
+    except DAMAGE as error:
+        raise FileFormatError(
+            f"{glb.path}: damaged, its meshes cannot be decompressed ({error})"
+        ) from error
+
+
+def _decompress(glb: Glb, primitive: dict[str, Any], compressed: dict[str, Any]) -> None:
+    decoded = _decoded(glb, compressed["bufferView"])
+    stored = {each["unique_id"]: each["data"] for each in decoded.attributes}
+    attributes = primitive["attributes"]
+    for name, number in compressed["attributes"].items():
+        like = attributes[name]
+        values = np.asarray(stored[number])
+        if len(values) != glb.item("accessors", like)["count"]:
+            raise ValueError("another number of vertices than it says")
+        attributes[name] = glb.add_array(
+            values.astype(glb.type_of(like)), like, bounds=name == "POSITION"
+        )
+    faces = np.asarray(decoded.faces, np.uint32)
+    if faces.size and faces.max() >= len(decoded.points):
+        raise ValueError("a face has a vertex that is not there")
+    primitive["indices"] = glb.add_array(faces.reshape(-1, 1))
+    primitive.pop("mode", None)  # They are triangles, as where none is named.
+
+
+def _decoded(glb: Glb, view: int) -> Any:
+    try:
+        import DracoPy
+    except ImportError as error:
+        raise BackendUnavailableError(
+            f"{glb.path}: its meshes are compressed ({EXTENSION}), which needs DracoPy: "
+            "pip install 'vnca[texture]'; or export it without"
+        ) from error
+    try:
+        mesh = DracoPy.decode(glb.bytes_of(view))
+    except DracoPy.FileTypeException as error:
+        raise ValueError(str(error)) from error
+    if not isinstance(mesh, DracoPy.DracoMesh):
+        raise ValueError("points without faces")
+    return mesh

@@ -23,12 +23,10 @@ from vnca.core.errors import (
 )
 from vnca.core.files import existing_file
 from vnca.core.typing import AnyArray
-from vnca.io.mesh.draco import decompress
-from vnca.io.mesh.glb import DAMAGE, Glb
-from vnca.io.mesh.obj import plain_obj
-from vnca.io.mesh.ply import PlyMesh, parse_ply
-from vnca.io.orientation import UpAxis
+from vnca.io.mesh.glb import DAMAGE, Glb, decompress
+from vnca.io.mesh.obj_ply import PlyMesh, parse_ply, plain_obj
 from vnca.io.picture import FORMATS
+from vnca.io.smoke_format import UpAxis
 
 SUFFIXES = (".glb", ".obj", ".ply", ".stl")
 """What `read_mesh` reads."""

@@ -15,7 +15,7 @@ from vnca.core.errors import GridError
 from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
-from vnca.losses.pixels import luma
+from vnca.losses.terms import luma
 from vnca.rendering.brightness import gamma_for_own_colour
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
 from vnca.rendering.velocity import projected_velocity
