@@ -20,7 +20,7 @@ from PIL import Image
 with atheris.instrument_imports(include=["vnca"]):
     from vnca.io.mesh.glb import Glb
     from vnca.io.mesh.mesh import read_mesh
-    from vnca.io.mesh.texture import base_colours
+    from vnca.io.mesh.texture import Unwrapping, base_colours, put_on
 
 _BETWEEN = b"\0\0\0\0"
 _SUFFIXES = {b"glTF": ".glb", b"ply": ".ply", b"solid": ".stl", b"STL": ".stl", b"v ": ".obj"}
@@ -38,13 +38,23 @@ def build(data: bytes) -> bytes:
 
 
 def read(path: Path) -> None:
-    """Read a mesh and the pictures on it."""
+    """Read a mesh and the pictures on it, put another on it, and write it."""
     with path.open("rb") as file:
         start = file.read(5)
     suffix = next((s for first, s in _SUFFIXES.items() if start.startswith(first)), ".glb")
     mesh = read_mesh(path.rename(path.with_suffix(suffix)))
     assert mesh.face_count > 0
     base_colours(mesh)
+    corners = [np.arange(surface.faces.size) for surface in mesh.surfaces]
+    put_on(
+        mesh,
+        [
+            Unwrapping(each.reshape(-1, 3), np.zeros((len(each), 2)), surface.faces.ravel())
+            for each, surface in zip(corners, mesh.surfaces, strict=True)
+        ],
+        b"",
+    )
+    mesh.glb.to_bytes()
 
 
 def limit(size: int) -> int:

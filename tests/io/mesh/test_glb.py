@@ -17,7 +17,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vnca.core.errors import BackendUnavailableError, FileFormatError, VncaError
-from vnca.io.mesh.glb import EXTENSION, Glb
+from vnca.io.mesh.draco import EXTENSION
+from vnca.io.mesh.glb import Glb
 from vnca.io.mesh.mesh import read_mesh
 
 NAME = Path("some.glb")
@@ -105,6 +106,14 @@ def test_interleaved_and_sparse_values_are_read() -> None:
         {"componentType": 1},
         {"type": "TENSOR"},
         {"count": None},
+        {"count": "4"},
+        {"count": True},
+        {"count": 3.5},
+        {"byteOffset": "0"},
+        {"byteOffset": False},
+        {"bufferView": False},
+        {"sparse": {"count": -1}},
+        {"sparse": 7},
     ],
 )
 def test_arrays_out_of_the_file_are_refused(change: dict[str, Any]) -> None:
@@ -113,6 +122,53 @@ def test_arrays_out_of_the_file_are_refused(change: dict[str, Any]) -> None:
     glb.document["accessors"][accessor].update(change)
     with pytest.raises(FileFormatError, match=r"some\.glb: damaged"):
         reread(glb).stored(accessor)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"byteOffset": -4},
+        {"byteOffset": "0"},
+        {"byteLength": None},
+        {"byteLength": 2**40},
+        {"byteLength": True},
+        {"byteStride": 1},
+        {"byteStride": -12},
+        {"byteStride": "12"},
+        {"byteStride": 2**70},
+        {"buffer": -1},
+        {"buffer": "0"},
+        {"buffer": 5},
+    ],
+)
+def test_views_out_of_the_file_are_refused(change: dict[str, Any]) -> None:
+    glb = made()
+    accessor = glb.add_array(np.zeros((4, 3), "<f4"))
+    glb.document["bufferViews"][0].update(change)
+    with pytest.raises(FileFormatError, match=r"some\.glb: damaged"):
+        reread(glb).stored(accessor)
+
+
+def test_whole_numbers_with_a_point_are_whole_numbers() -> None:
+    glb = made()
+    accessor = glb.add_array(np.arange(6, dtype="<f4").reshape(2, 3))
+    glb.document["accessors"][accessor] |= {"count": 2.0, "byteOffset": 0.0}
+    glb.document["bufferViews"][0] |= {"byteOffset": 0.0, "byteLength": 24.0, "buffer": 0.0}
+    np.testing.assert_array_equal(reread(glb).stored(accessor), [[0, 1, 2], [3, 4, 5]])
+
+
+@pytest.mark.parametrize("kind", [5120, 5122, 5126])
+def test_sparse_indices_that_may_be_negative_are_refused(kind: int) -> None:
+    glb = made()
+    sparse = {
+        "count": 1,
+        "indices": {"bufferView": glb.add_bytes(b"\xff" * 4), "componentType": kind},
+        "values": {"bufferView": glb.add_bytes(np.ones(3, "<f4").tobytes())},
+    }
+    glb.items("accessors").append({**ACCESSOR, "sparse": sparse})
+    glb.document["accessors"][0]["bufferView"] = glb.add_bytes(bytes(24))
+    with pytest.raises(FileFormatError, match=r"some\.glb: damaged"):
+        reread(glb).stored(0)
 
 
 def test_zeros_without_bytes_are_not_made_without_end() -> None:

@@ -1,5 +1,6 @@
 import json
 import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -183,14 +184,16 @@ def test_a_damaged_document_is_told_of(tmp_path: Path) -> None:
         {"buffers": [7]},
         {"extensionsRequired": 1},
         {"meshes": [], "nodes": [[1]], "scenes": [{"nodes": [0]}]},
-        {"nodes": [{"scale": [float("nan")] * 3, "mesh": 0}], "scenes": [{"nodes": [0]}]},
+        {"nodes": {"mesh": 0}},
+        {"nodes": "mesh"},
+        {"images": [None]},
         {
-            "accessors": [{"componentType": 5126, "type": "VEC3", "count": float("inf")}],
+            "accessors": [{"componentType": 5126, "type": "VEC3", "count": "1"}],
             "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
             "nodes": [{"mesh": 0}],
         },
     ],
-    ids=range(6),
+    ids=range(8),
 )
 def test_json_of_another_kind_than_expected_is_one_clear_line(
     tmp_path: Path, document: dict[str, Any]
@@ -201,6 +204,106 @@ def test_json_of_another_kind_than_expected_is_one_clear_line(
     path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk)
     with pytest.raises(FileFormatError, match=r"a\.glb: damaged"):
         read_mesh(path)
+
+
+@pytest.mark.parametrize("value", ["NaN", "Infinity", "-Infinity", "1e999"])
+def test_numbers_of_the_json_that_are_not_finite_are_one_clear_line(
+    tmp_path: Path, value: str
+) -> None:
+    text = f'{{"extras": [1.5, {value}]}}'.encode()
+    chunk = struct.pack("<II", len(text), 0x4E4F534A) + text
+    path = tmp_path / "a.glb"
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk)
+    with pytest.raises(FileFormatError, match=rf"a\.glb: .* not finite \({value}\)"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [("rotation", 4), ("scale", 3), ("translation", 3), ("matrix", 16)]
+)
+@pytest.mark.parametrize(
+    "value",
+    # Numpy takes most of these: a text times a number is many texts.
+    [
+        lambda n: "1" * n,
+        lambda n: ["x"] * n,
+        lambda n: ["1"] * n,
+        lambda n: [True] * n,
+        lambda _: 1,
+        lambda _: [1],
+        lambda n: [1] * (n + 1),
+        lambda n: [[1] * n],
+        lambda n: dict.fromkeys("abcdefghijklmnop"[:n], 1),
+        lambda _: None,
+        lambda n: [10**400] * n,
+    ],
+    ids=range(11),
+)
+def test_the_place_of_a_node_is_so_many_numbers_or_damage(
+    tmp_path: Path, name: str, count: int, value: Callable[[int], Any]
+) -> None:
+    glb = Glb.read(saved(tmp_path / "a.glb"))
+    glb.document["nodes"] = [{"mesh": 0, name: value(count)}]
+    glb.document["scenes"] = [{"nodes": [0]}]
+    glb.write(tmp_path / "b.glb")
+    with pytest.raises(FileFormatError, match=r"b\.glb: damaged"):
+        read_mesh(tmp_path / "b.glb")
+
+
+def test_texts_in_a_large_turn_are_not_repeated(tmp_path: Path) -> None:
+    glb = Glb.read(saved(tmp_path / "a.glb"))
+    glb.document["nodes"] = [{"mesh": 0, "rotation": [2**40, 2**40, 2**40, 1], "scale": ["x"] * 3}]
+    glb.document["scenes"] = [{"nodes": [0]}]
+    glb.write(tmp_path / "b.glb")
+    with pytest.raises(FileFormatError, match="`scale` should be 3 finite numbers"):
+        read_mesh(tmp_path / "b.glb")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"nodes": [{"mesh": True}]},
+        {"nodes": [{"mesh": 0.5}]},
+        {"nodes": [{"mesh": "0"}]},
+        {"nodes": [{"mesh": -1}]},
+        {"nodes": [{"mesh": [0]}]},
+        {"nodes": [{"mesh": 0, "children": [-1]}]},
+        {"nodes": [{"mesh": 0, "children": [False]}]},
+        {"nodes": [{"mesh": 0, "children": "0"}]},
+        {"nodes": [{"mesh": 0, "children": 1}]},
+        {"scenes": [{"nodes": [False]}]},
+        {"scenes": [{"nodes": ["0"]}]},
+        {"scenes": [{"nodes": 0}]},
+        {"meshes": [{"primitives": 1}]},
+        {"meshes": [{"primitives": ["x"]}]},
+        {"meshes": [{"primitives": [{"attributes": "POSITION"}]}]},
+        {"meshes": [{"primitives": [{"attributes": {"POSITION": False}}]}]},
+    ],
+    ids=str,
+)
+def test_numbers_of_entries_that_are_none_are_damage(
+    tmp_path: Path, change: dict[str, Any]
+) -> None:
+    glb = Glb.read(saved(tmp_path / "a.glb"))
+    glb.document |= {"nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], **change}
+    glb.write(tmp_path / "b.glb")
+    with pytest.raises(FileFormatError, match=r"b\.glb: damaged"):
+        read_mesh(tmp_path / "b.glb")
+
+
+@pytest.mark.parametrize(
+    "values",
+    [np.arange(3, dtype="<f4"), np.arange(3, dtype="i1"), np.arange(6, dtype="u1").reshape(3, 2)],
+)
+def test_indices_that_are_no_counting_numbers_are_damage(
+    tmp_path: Path, values: np.ndarray
+) -> None:
+    glb = Glb.read(saved(tmp_path / "a.glb"))
+    (mesh,) = glb.items("meshes")
+    mesh["primitives"][0]["indices"] = glb.add_array(values.reshape(3, -1))
+    glb.write(tmp_path / "b.glb")
+    with pytest.raises(FileFormatError, match=r"b\.glb: damaged"):
+        read_mesh(tmp_path / "b.glb")
 
 
 def test_parts_that_share_vertices_cannot_multiply_them_without_end(

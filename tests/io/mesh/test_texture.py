@@ -1,6 +1,7 @@
 import base64
 import io
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -245,6 +246,89 @@ def test_uvs_go_where_the_transform_of_a_texture_puts_them(plain: Path) -> None:
     (colour,) = base_colours(read_mesh(pictured(plain, change)))
     # A quarter turn anticlockwise where v goes down: (1, 0) is turned to (0, −1).
     np.testing.assert_allclose(colour.uv[:3], [[0.25, 0.5], [0.25, 0], [2.25, 0.5]], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"scale": "11"},
+        {"scale": ["1", "1"]},
+        {"scale": [1]},
+        {"scale": [1e308, 1e308]},
+        {"offset": 5},
+        {"offset": [1e30, 0]},
+        {"rotation": "1"},
+        {"rotation": None},
+        {"texCoord": -1},
+        {"texCoord": "0"},
+    ],
+    ids=str,
+)
+def test_a_transform_that_is_none_is_damage(plain: Path, change: dict[str, Any]) -> None:
+    def damage(glb: Glb) -> None:
+        info = glb.document["materials"][-1]["pbrMetallicRoughness"]["baseColorTexture"]
+        info["extensions"] = {"KHR_texture_transform": change}
+
+    with pytest.raises(FileFormatError, match="damaged"):
+        base_colours(read_mesh(pictured(plain, damage)))
+
+
+@pytest.mark.parametrize(
+    "factor", ["1111", [1, 1, 1], ["1", "1", "1", "1"], None, 1, [[1, 1, 1, 1]]], ids=str
+)
+def test_a_colour_that_is_none_is_damage_to_who_reads_and_to_who_writes(
+    plain: Path, factor: Any
+) -> None:
+    def damage(glb: Glb) -> None:
+        glb.document["materials"][-1]["pbrMetallicRoughness"]["baseColorFactor"] = factor
+
+    mesh = read_mesh(pictured(plain, damage))
+    with pytest.raises(FileFormatError, match="`baseColorFactor` should be 4 finite numbers"):
+        base_colours(mesh)
+    with pytest.raises(FileFormatError, match="`baseColorFactor` should be 4 finite numbers"):
+        put_on(mesh, split(mesh), png())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda glb: glb.document["materials"].__setitem__(-1, {"pbrMetallicRoughness": 1}),
+        lambda glb: glb.document["materials"].__setitem__(-1, {"extensions": 1}),
+        lambda glb: primitive_of(glb).update(material=[0]),
+        lambda glb: primitive_of(glb).update(material=False),
+        lambda glb: primitive_of(glb).update(targets={"POSITION": 0}),
+        lambda glb: primitive_of(glb).update(targets=[{"POSITION": "0"}]),
+        lambda glb: primitive_of(glb).update(targets=[{"POSITION": not_finite(glb)}]),
+    ],
+    ids=range(7),
+)
+def test_who_writes_a_texture_into_a_damaged_document_is_told(
+    plain: Path, change: Callable[[Glb], object]
+) -> None:
+    mesh = read_mesh(pictured(plain, change))
+    moved = [replace(each, source=np.roll(each.source, 1)) for each in split(mesh)]
+    with pytest.raises(FileFormatError, match="damaged"):
+        textured(plain.parent, mesh, moved)
+
+
+def primitive_of(glb: Glb) -> dict[str, Any]:
+    return glb.document["meshes"][0]["primitives"][0]
+
+
+def not_finite(glb: Glb) -> int:
+    count = glb.document["accessors"][primitive_of(glb)["attributes"]["POSITION"]]["count"]
+    return glb.add_array(np.full((count, 3), np.nan, "<f4"))
+
+
+def test_uvs_of_another_number_than_vertices_are_damage(plain: Path) -> None:
+    def change(glb: Glb) -> None:
+        attributes = primitive_of(glb)["attributes"]
+        attributes["TEXCOORD_1"] = glb.add_array(np.zeros((2, 2), "<f4"))
+        info = glb.document["materials"][-1]["pbrMetallicRoughness"]["baseColorTexture"]
+        info["texCoord"] = 1
+
+    with pytest.raises(FileFormatError, match="as many UVs as vertices"):
+        base_colours(read_mesh(pictured(plain, change)))
 
 
 def test_split_vertices_stay_quantised(tmp_path: Path) -> None:

@@ -1,15 +1,14 @@
 """GLB files: binary glTF 2.0, as its JSON document and one block of bytes.
 
 The document stays the JSON it was in the file: whatever is not understood here (animations,
-skins, lights, extensions, extras) is written back as it came. Meshes that Draco
-compressed are made plain.
+skins, lights, extensions, extras) is written back as it came.
 
-Reference: Khronos glTF 2.0 specification, sections 3.6 (accessors) and 4 (GLB); glTF extension
-KHR_draco_mesh_compression.
+Reference: Khronos glTF 2.0 specification, sections 3.6 (accessors) and 4 (GLB).
 """
 
 import base64
 import json
+import math
 import struct
 from pathlib import Path
 from typing import Any
@@ -17,9 +16,10 @@ from urllib.parse import unquote_to_bytes
 
 import numpy as np
 
-from vnca.core.errors import BackendUnavailableError, FileFormatError
+from vnca.core.errors import FileFormatError
 from vnca.core.files import existing_file, whole_file
 from vnca.core.typing import AnyArray
+from vnca.io.mesh.entries import whole
 
 _MAGIC, _VERSION = 0x46546C67, 2
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
@@ -27,8 +27,11 @@ _DTYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: 
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 DAMAGE = (KeyError, TypeError, AttributeError, ValueError, IndexError, OverflowError)
 """What using a document raises whose JSON holds other things than glTF says."""
+_LISTS = (
+    "accessors", "bufferViews", "buffers", "images", "materials", "meshes", "nodes", "samplers",
+    "scenes", "textures",
+)  # fmt: skip
 _MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-EXTENSION = "KHR_draco_mesh_compression"
 
 
 class Glb:
@@ -78,23 +81,39 @@ class Glb:
             at += 8 + length + -length % 4
         try:
             # It should end in spaces, but some writers fill up with zeros, as the other chunk does.
-            document = json.loads(chunks[_JSON].rstrip(b"\0"))
+            document = json.loads(
+                chunks[_JSON].rstrip(b"\0"), parse_float=_finite, parse_constant=_finite
+            )
+        except _NotFiniteError as error:
+            raise FileFormatError(
+                f"{path}: has numbers that are not finite ({error}); repair the mesh first"
+            ) from error
         except (KeyError, ValueError, RecursionError) as error:
             raise FileFormatError(f"{path}: damaged, its JSON cannot be read") from error
         if not isinstance(document, dict):
             raise FileFormatError(f"{path}: damaged, its JSON is not a document")
         glb = cls(path, document)
         try:
+            glb._require_lists()
             glb._require_plain()
             glb._gather(chunks.get(_BIN, b""))
         except DAMAGE as error:
-            raise FileFormatError(f"{path}: damaged, its JSON is no glTF document") from error
+            raise FileFormatError(
+                f"{path}: damaged, its JSON is no glTF document ({error})"
+            ) from error
         return glb
 
     def to_bytes(self) -> bytes:
-        """The GLB file."""
+        """The GLB file.
+
+        Raises:
+            FileFormatError: If the document is nested too deep.
+        """
         self.document["buffers"] = self._buffers()
-        text = json.dumps(self.document, separators=(",", ":"), allow_nan=False).encode()
+        try:
+            text = json.dumps(self.document, separators=(",", ":"), allow_nan=False).encode()
+        except RecursionError as error:  # What was read may be nested just too deep to be written.
+            raise FileFormatError(f"{self.path}: its JSON is nested too deep") from error
         text += b" " * (-len(text) % 4)
         blob = bytes(self._blob) + bytes(-len(self._blob) % 4)
         chunks = struct.pack("<II", len(text), _JSON) + text
@@ -123,7 +142,7 @@ class Glb:
             FileFormatError: If there is none of that index.
         """
         entries = self.document.get(kind, [])
-        if not isinstance(index, int) or not 0 <= index < len(entries):
+        if type(index) is not int or not 0 <= index < len(entries):
             raise FileFormatError(f"{self.path}: damaged, there is no {index} among its {kind}")
         return entries[index]
 
@@ -140,10 +159,9 @@ class Glb:
         entry = self.item("accessors", accessor)
         try:
             dtype, width = self.type_of(accessor), _COMPONENTS[entry["type"]]
-            count = int(entry["count"])
+            count = whole(entry, "count")
             if "bufferView" in entry:
-                values = self._viewed(entry["bufferView"], entry.get("byteOffset", 0),
-                                      dtype, count, width).copy()  # fmt: skip
+                values = self._viewed(entry, dtype, count, width).copy()
             elif count * width * dtype.itemsize <= max(len(self._blob), 1):
                 values = np.zeros((count, width), dtype)
             else:
@@ -174,6 +192,9 @@ class Glb:
             values: float32, or integers of a type glTF has.
             like: An accessor whose type, name and extras are taken over.
             bounds: Record least and greatest values, as positions need them.
+
+        Raises:
+            ValueError: If bounds are not finite.
         """
         kind = next(code for code, name in _DTYPES.items() if np.dtype(name) == values.dtype)
         shape = next(name for name, width in _COMPONENTS.items() if width == values.shape[1])
@@ -190,6 +211,8 @@ class Glb:
         entry = {"componentType": kind, "type": shape, **original,
                  "bufferView": view, "count": len(values)}  # fmt: skip
         if bounds:
+            if not np.isfinite(values).all():
+                raise ValueError("positions that are not finite")
             entry |= {"min": values.min(0).tolist(), "max": values.max(0).tolist()}
         self.items("accessors").append(entry)
         return len(self.items("accessors")) - 1
@@ -229,30 +252,23 @@ class Glb:
                 self.document[listed] = [kept for kept in self.document[listed] if kept != name]
 
     def _viewed(
-        self, view: int, offset: int, dtype: np.dtype[Any], count: int, width: int
+        self, entry: dict[str, Any], dtype: np.dtype[Any], count: int, width: int
     ) -> AnyArray:
-        data = self.bytes_of(view)
+        """Values in the buffer view that an entry names, from its offset on."""
+        data, offset = self.bytes_of(entry["bufferView"]), whole(entry, "byteOffset", 0)
         row = dtype.itemsize * width
-        stride = self.item("bufferViews", view).get("byteStride") or row
-        if (
-            count < 1
-            or offset < 0
-            or stride < row
-            or offset + (count - 1) * stride + row > len(data)
-        ):
+        stride = whole(self.item("bufferViews", entry["bufferView"]), "byteStride", 0) or row
+        if count < 1 or stride < row or offset + (count - 1) * stride + row > len(data):
             raise ValueError("out of its buffer")
         return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
 
     def _scatter(self, values: AnyArray, sparse: dict[str, Any]) -> None:
         """Put the few values in that differ from the rest."""
-        count, where, what = sparse["count"], sparse["indices"], sparse["values"]
-        rows = self._viewed(
-            where["bufferView"], where.get("byteOffset", 0),
-            np.dtype(_DTYPES[where["componentType"]]), count, 1,
-        )  # fmt: skip
-        values[rows[:, 0]] = self._viewed(
-            what["bufferView"], what.get("byteOffset", 0), values.dtype, count, values.shape[1]
-        )
+        count, kind = whole(sparse, "count"), np.dtype(_DTYPES[sparse["indices"]["componentType"]])
+        if kind.kind != "u":
+            raise ValueError("sparse indices of another type than unsigned numbers")
+        rows = self._viewed(sparse["indices"], kind, count, 1)
+        values[rows[:, 0]] = self._viewed(sparse["values"], values.dtype, count, values.shape[1])
 
     def _buffers(self) -> list[dict[str, Any]]:
         first = dict(next(iter(self.document.get("buffers", [])), {}))
@@ -261,11 +277,12 @@ class Glb:
     def _extent(self, view: int, size: int) -> tuple[int, int]:
         """Where a buffer view begins in a buffer of `size` bytes, and its length."""
         entry = self.item("bufferViews", view)
-        start, length = entry.get("byteOffset", 0), entry.get("byteLength", -1)
-        if not (isinstance(start, int) and isinstance(length, int)) or (
-            start < 0 or length < 0 or start + length > size
-        ):
-            raise FileFormatError(f"{self.path}: damaged, buffer view {view} is out of the file")
+        try:
+            start, length = whole(entry, "byteOffset", 0), whole(entry, "byteLength")
+            if start + length > size:
+                raise ValueError("out of the file")
+        except DAMAGE as error:
+            raise FileFormatError(f"{self.path}: damaged, buffer view {view}: {error}") from error
         return start, length
 
     def _embedded(self, uri: str) -> bytes:
@@ -295,13 +312,20 @@ class Glb:
             starts.append(len(self._blob))
             self._blob += part
         for view, entry in enumerate(self.document.get("bufferViews", [])):
-            buffer = entry.get("buffer", 0)
+            buffer = whole(entry, "buffer", 0)
             if buffer:
                 start, _ = self._extent(view, len(parts[buffer]))
                 entry |= {"buffer": 0, "byteOffset": starts[buffer] + start}
         if buffers:
             first = {key: value for key, value in buffers[0].items() if key != "uri"}
             self.document["buffers"] = [first]
+
+    def _require_lists(self) -> None:
+        """Refuse a document whose lists are no lists of entries."""
+        for kind in _LISTS:
+            entries = self.document.get(kind, [])
+            if not isinstance(entries, list) or not all(isinstance(e, dict) for e in entries):
+                raise ValueError(f"its `{kind}` should be a list of entries")
 
     def _require_plain(self) -> None:
         """Refuse data that meshopt compressed; where plain ones stand beside them, keep those."""
@@ -317,64 +341,12 @@ class Glb:
             self.drop_extension(name)
 
 
-def decompress(glb: Glb) -> None:
-    """Put plain vertices and faces in place of compressed ones, in a document.
-
-    Where the file holds plain ones too, those are kept.
-
-    Raises:
-        FileFormatError: If what is compressed cannot be read.
-        BackendUnavailableError: If DracoPy is needed and not installed.
-    """
-    try:
-        for mesh in glb.document.get("meshes", []):
-            for primitive in mesh["primitives"]:
-                compressed = primitive.get("extensions", {}).pop(EXTENSION, None)
-                if compressed is None:
-                    continue
-                stored = [primitive["attributes"][name] for name in compressed["attributes"]]
-                if not all("bufferView" in glb.item("accessors", each) for each in stored):
-                    _decompress(glb, primitive, compressed)
-                if not primitive["extensions"]:
-                    del primitive["extensions"]
-        glb.drop_extension(EXTENSION)
-    except DAMAGE as error:
-        raise FileFormatError(
-            f"{glb.path}: damaged, its meshes cannot be decompressed ({error})"
-        ) from error
+class _NotFiniteError(Exception):
+    """JSON of Python's kind, with NaN and Infinity, or a number that is too large."""
 
 
-def _decompress(glb: Glb, primitive: dict[str, Any], compressed: dict[str, Any]) -> None:
-    decoded = _decoded(glb, compressed["bufferView"])
-    stored = {each["unique_id"]: each["data"] for each in decoded.attributes}
-    attributes = primitive["attributes"]
-    for name, number in compressed["attributes"].items():
-        like = attributes[name]
-        values = np.asarray(stored[number])
-        if len(values) != glb.item("accessors", like)["count"]:
-            raise ValueError("another number of vertices than it says")
-        attributes[name] = glb.add_array(
-            values.astype(glb.type_of(like)), like, bounds=name == "POSITION"
-        )
-    faces = np.asarray(decoded.faces, np.uint32)
-    if faces.size and faces.max() >= len(decoded.points):
-        raise ValueError("a face has a vertex that is not there")
-    primitive["indices"] = glb.add_array(faces.reshape(-1, 1))
-    primitive.pop("mode", None)  # They are triangles, as where none is named.
-
-
-def _decoded(glb: Glb, view: int) -> Any:
-    try:
-        import DracoPy
-    except ImportError as error:
-        raise BackendUnavailableError(
-            f"{glb.path}: its meshes are compressed ({EXTENSION}), which needs DracoPy: "
-            "pip install 'vnca[texture]'; or export it without"
-        ) from error
-    try:
-        mesh = DracoPy.decode(glb.bytes_of(view))
-    except DracoPy.FileTypeException as error:
-        raise ValueError(str(error)) from error
-    if not isinstance(mesh, DracoPy.DracoMesh):
-        raise ValueError("points without faces")
-    return mesh
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise _NotFiniteError(text)
+    return value

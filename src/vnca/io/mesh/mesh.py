@@ -23,7 +23,9 @@ from vnca.core.errors import (
 )
 from vnca.core.files import existing_file
 from vnca.core.typing import AnyArray
-from vnca.io.mesh.glb import DAMAGE, Glb, decompress
+from vnca.io.mesh.draco import decompress
+from vnca.io.mesh.entries import numbers
+from vnca.io.mesh.glb import DAMAGE, Glb
 from vnca.io.mesh.obj_ply import PlyMesh, parse_ply, plain_obj
 from vnca.io.picture import FORMATS
 from vnca.io.smoke_format import UpAxis
@@ -224,7 +226,10 @@ def _surfaces(glb: Glb) -> Iterator[Surface]:
 
 def _faces(glb: Glb, primitive: dict[str, Any], mode: int, points: int) -> AnyArray:
     if "indices" in primitive:
-        order = glb.stored(primitive["indices"])[:, 0].astype(np.int64)
+        stored = glb.stored(primitive["indices"])
+        if stored.shape[1] != 1 or stored.dtype.kind != "u":
+            raise ValueError("indices of another type than unsigned numbers")
+        order = stored[:, 0].astype(np.int64)
     else:
         order = np.arange(points)
     if len(order) and not 0 <= order.min() <= order.max() < points:
@@ -248,10 +253,10 @@ def _placed_meshes(glb: Glb) -> Iterator[tuple[int, AnyArray]]:
     waiting = [(node, np.eye(4)) for node in reversed(roots)]
     while waiting:
         index, above = waiting.pop()
+        node = glb.item("nodes", index)
         if index in visited:
             continue
         visited.add(index)
-        node = glb.item("nodes", index)
         matrix = above @ _local(node)
         waiting += [(child, matrix) for child in reversed(node.get("children", []))]
         mesh = node.get("mesh")
@@ -267,8 +272,8 @@ def _local(node: dict[str, Any]) -> AnyArray:
     Reference: glTF 2.0, section 3.5.3.
     """
     if "matrix" in node:
-        return np.array(node["matrix"], np.float64).reshape(4, 4).T
-    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+        return numbers(node, "matrix", (0.0,) * 16).reshape(4, 4).T
+    x, y, z, w = numbers(node, "rotation", (0.0, 0.0, 0.0, 1.0))
     turned = np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -277,6 +282,6 @@ def _local(node: dict[str, Any]) -> AnyArray:
         ]
     )
     matrix = np.eye(4)
-    matrix[:3, :3] = turned * np.asarray(node.get("scale", (1.0, 1.0, 1.0)))
-    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    matrix[:3, :3] = turned * numbers(node, "scale", (1.0, 1.0, 1.0))
+    matrix[:3, 3] = numbers(node, "translation", (0.0, 0.0, 0.0))
     return matrix

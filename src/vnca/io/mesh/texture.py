@@ -13,12 +13,15 @@ from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import FileFormatError
 from vnca.core.files import whole_file
 from vnca.core.typing import AnyArray, FloatArray
+from vnca.io.mesh.entries import number, numbers, whole
 from vnca.io.mesh.glb import DAMAGE, Glb
 from vnca.io.mesh.mesh import TO_OURS, TRIANGLES, Mesh, Surface, trimesh_for
 from vnca.io.picture import FORMATS, kind_of
 
 # Of samplers, as OpenGL numbers them.
 _LINEAR, _MIPMAPS, _CLAMPED = 9729, 9987, 33071
+_FARTHEST = 2.0**30  # Times the width of any picture, a whole number that int64 holds.
+_WHITE = (1.0, 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +69,19 @@ def put_on(
         unwrappings: One a surface.
         png: The picture.
         roughness: Of surfaces without a material of their own.
+
+    Raises:
+        FileFormatError: If the materials or attributes of the file are damaged.
     """
+    try:
+        _put_on(mesh, unwrappings, png, roughness)
+    except DAMAGE as error:
+        raise FileFormatError(
+            f"{mesh.glb.path}: damaged, it cannot be given a texture ({error})"
+        ) from error
+
+
+def _put_on(mesh: Mesh, unwrappings: Sequence[Unwrapping], png: bytes, roughness: float) -> None:
     glb = mesh.glb
     glb.items("images").append(
         {"name": "vnca", "mimeType": "image/png", "bufferView": glb.add_bytes(png)}
@@ -161,7 +176,7 @@ def _material(
         }  # fmt: skip
     material = dict(glb.item("materials", original))
     shading = dict(material.get("pbrMetallicRoughness", {}))
-    opacity = list(shading.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))[3]
+    opacity = float(numbers(shading, "baseColorFactor", _WHITE)[3])
     shading |= {"baseColorTexture": texture, "baseColorFactor": [1.0, 1.0, 1.0, opacity]}
     material |= {
         "name": f"{material.get('name') or f'material {original}'} (vnca)",
@@ -178,13 +193,18 @@ def _base_colour(glb: Glb, surface: Surface, pictures: dict[int, FloatArray]) ->
     material = surface.primitive.get("material")
     shading = glb.item("materials", material) if material is not None else {}
     shading = shading.get("pbrMetallicRoughness", {})
-    factor = np.array(shading.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[:3], np.float32)
+    factor = np.clip(numbers(shading, "baseColorFactor", _WHITE)[:3], 0, 1).astype(np.float32)
     texture = shading.get("baseColorTexture")
     if texture is None:
         return BaseColour(np.zeros((len(surface.points), 2)), factor.reshape(1, 1, 3), True)
     transform = texture.get("extensions", {}).get("KHR_texture_transform", {})
-    uv_set = transform.get("texCoord", texture.get("texCoord", 0))
-    uv = _moved(glb.array(surface.primitive["attributes"][f"TEXCOORD_{uv_set}"]), transform)
+    uv_set = whole(transform, "texCoord", whole(texture, "texCoord", 0))
+    stored = glb.array(surface.primitive["attributes"][f"TEXCOORD_{uv_set}"])
+    if stored.shape != (len(surface.points), 2):
+        raise ValueError("as many UVs as vertices are needed")
+    uv = _moved(stored, transform)
+    if not (np.abs(uv[surface.faces]) <= _FARTHEST).all():  # Nor is a NaN.
+        raise ValueError("UVs that are no places in a picture")
     entry = glb.item("textures", texture["index"])
     # Extensions name pictures of other formats, which may stand beside a usual one.
     sources = [entry, *entry.get("extensions", {}).values()]
@@ -200,10 +220,11 @@ def _moved(uv: AnyArray, transform: dict[str, Any]) -> AnyArray:
 
     Reference: Khronos, glTF extension KHR_texture_transform.
     """
-    turn = float(transform.get("rotation", 0.0))
+    turn = number(transform, "rotation", 0.0)
     c, s = np.cos(turn), np.sin(turn)
-    scaled = uv * np.asarray(transform.get("scale", (1.0, 1.0)), np.float64)
-    return scaled @ np.array([[c, -s], [s, c]]) + transform.get("offset", (0.0, 0.0))
+    with np.errstate(over="ignore", invalid="ignore"):  # refused where it is used
+        scaled = uv * numbers(transform, "scale", (1.0, 1.0))
+        return scaled @ np.array([[c, -s], [s, c]]) + numbers(transform, "offset", (0.0, 0.0))
 
 
 def _decoded(glb: Glb, data: bytes) -> FloatArray:
