@@ -15,7 +15,7 @@ from workshop import HERE, drawn, made, texture_of
 
 from vnca.core.typing import FloatArray
 from vnca.io.film import contact_sheet
-from vnca.io.mesh.mesh import read_mesh
+from vnca.io.mesh import read_mesh
 from vnca.io.picture import fit, read_image, write_image
 from vnca.meshes.turntable import Turntable, TurntableConfig, textured
 

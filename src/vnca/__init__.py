@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from vnca.rendering.view import render as render_view
     from vnca.rule.model import Model
     from vnca.rule.rule import Rule, RuleConfig, Scales
-    from vnca.simulation.scenes import simulate as simulate_smoke
+    from vnca.simulation import simulate as simulate_smoke
     from vnca.training.loop import Trainer
     from vnca.training.smoke_config import PRESETS, SmokeConfig
     from vnca.training.smoke_trainer import smoke_trainer
@@ -84,7 +84,7 @@ _HOMES = {
     "read_image": "io.picture",
     "read_smoke": "io.smoke",
     "render_view": "rendering.view:render",
-    "simulate_smoke": "simulation.scenes:simulate",
+    "simulate_smoke": "simulation:simulate",
     "smoke_box": "io.smoke",
     "smoke_trainer": "training.smoke_trainer",
     "stylize_frames": "painting.roll:stylize",

@@ -7,7 +7,7 @@ from PIL import Image
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
-from vnca.io.mesh.mesh import Mesh, read_mesh
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import BaseColour
 from vnca.meshes.atlas import Placement, TexelMap, bake, fill, to_png, unwrapped
 from vnca.meshes.turntable import read_picture

@@ -5,7 +5,7 @@ import pytest
 import torch
 import trimesh
 
-from vnca.io.mesh.mesh import read_mesh
+from vnca.io.mesh import read_mesh
 from vnca.training.scenes.texture import BlockScene, mesh_views
 from vnca.training.texture_config import SliceConfig
 

@@ -7,7 +7,7 @@ import trimesh
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
-from vnca.io.mesh.mesh import read_mesh
+from vnca.io.mesh import read_mesh
 from vnca.io.mesh.texture import put_on
 from vnca.meshes.atlas import Placement, bake, to_png, unwrapped
 from vnca.meshes.turntable import Turntable, TurntableConfig, solid, textured

@@ -24,7 +24,7 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import Painter
 from vnca.painting.roll import Roll
 from vnca.rule.rule import Rule, RuleConfig, Scales
-from vnca.simulation.scenes import simulate
+from vnca.simulation import simulate
 
 BACKENDS = ("native", "numpy")
 TOLERANCES: dict[str, float] = {"float32": 1e-3, "bfloat16": 5e-2}

@@ -25,7 +25,7 @@ from vnca.io.picture import read_style
 from vnca.io.smoke import SmokeFormat
 from vnca.recipe.sequence import beside, read_alone
 from vnca.recipe.session import choose_device
-from vnca.simulation.scenes import simulate
+from vnca.simulation import simulate
 from vnca.training.memory import memory_budget
 from vnca.training.smoke_config import PRESETS, SmokeConfig
 

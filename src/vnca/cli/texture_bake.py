@@ -13,7 +13,7 @@ from vnca.cli.progress import made
 from vnca.cli.texture_block import BlockConfig, grown_blocks, texture_rule
 from vnca.core.errors import OptionError
 from vnca.core.files import whole_file, writable_file
-from vnca.io.mesh.mesh import Mesh, read_mesh
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import put_on, write_coloured
 from vnca.io.picture import to_srgb8
 from vnca.io.smoke_format import UpAxis

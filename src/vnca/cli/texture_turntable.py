@@ -15,7 +15,7 @@ from vnca.core.errors import OptionError
 from vnca.core.files import writable_file
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.film import FilmWriter
-from vnca.io.mesh.mesh import Mesh, read_mesh
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.picture import SUFFIXES as PICTURES
 from vnca.io.picture import write_image
 from vnca.io.smoke_format import UpAxis

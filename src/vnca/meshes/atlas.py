@@ -10,7 +10,7 @@ from PIL import Image
 
 from vnca.core.errors import BackendUnavailableError, GridError, OptionError
 from vnca.core.typing import AnyArray, FloatArray, IntArray
-from vnca.io.mesh.mesh import Mesh, Surface
+from vnca.io.mesh import Mesh, Surface
 from vnca.io.mesh.texture import Unwrapping
 from vnca.io.picture import to_srgb8
 from vnca.meshes.raster import fragments, weights_at

@@ -9,7 +9,7 @@ import numpy as np
 from vnca.core.camera import Orthographic, view_axes
 from vnca.core.errors import OptionError
 from vnca.core.typing import AnyArray, FloatArray
-from vnca.io.mesh.mesh import Mesh
+from vnca.io.mesh import Mesh
 from vnca.io.mesh.texture import BaseColour, base_colours
 from vnca.meshes.atlas import Placement
 from vnca.meshes.raster import visible

@@ -17,9 +17,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vnca.core.errors import BackendUnavailableError, FileFormatError, VncaError
+from vnca.io.mesh import read_mesh
 from vnca.io.mesh.draco import EXTENSION
 from vnca.io.mesh.glb import Glb
-from vnca.io.mesh.mesh import read_mesh
 
 NAME = Path("some.glb")
 NUMBERS = np.arange(6, dtype="<f4").reshape(2, 3)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from vnca.core.errors import VncaError
-from vnca.io.mesh.mesh import read_mesh
+from vnca.io.mesh import read_mesh
 from vnca.io.mesh.obj_ply import PlyMesh, parse_ply, plain_obj
 from vnca.io.mesh.texture import base_colours
 

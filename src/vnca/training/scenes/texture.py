@@ -9,7 +9,7 @@ from torch import Tensor
 
 from vnca.core.camera import Orthographic
 from vnca.core.typing import BoolArray, FloatArray
-from vnca.io.mesh.mesh import Mesh
+from vnca.io.mesh import Mesh
 from vnca.meshes.raster import visible
 from vnca.painting.block import block_domain
 from vnca.rendering.colour import srgb_to_linear
