@@ -1,6 +1,6 @@
 """The step on NVIDIA GPUs in torch's automatic differentiation, computed by Triton kernels."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -32,7 +32,7 @@ T = TypeVar("T")
 Precision = Literal["ieee", "tf32x3", "tf32"]
 """Products of float32: exact, as three products on tensor cores (nearly so), as one (10 bits)."""
 PROGRAMS = 4
-"""Programs for each multiprocessor; they take tiles of changing cells in turns."""
+"""Programs for each multiprocessor; they take tiles of changing cells, or of points, in turns."""
 TILE = 64
 """Cells that a program works on at a time, if their channels are 16 or fewer."""
 WARPS = 4, 8, 4
@@ -144,9 +144,7 @@ def update(
         ShapeError: If shapes or types are not as above, or too large.
     """
     _check(state, rows, neighbours, priors, weights)
-    if precision is None:
-        exact = torch.get_float32_matmul_precision() == "highest"
-        precision = "tf32x3" if exact else "tf32"
+    precision = precision or default_precision()
     trained = torch.is_grad_enabled() and any(t.requires_grad for t in (state, *weights))
     perceivers = _known(_perceivers, Perceivers.of, neighbours) if trained else None
     scales = _known(_scales, _read_scales, stencil)
@@ -168,7 +166,8 @@ class _Update(torch.autograd.Function):
         out = torch.empty_like(state)
         sizes = _sizes(state, tensors[3], tensors[4], WEIGHT_BYTES[0])
         with torch.cuda.device_of(state):
-            step_kernels.forward_kernel[(_programs(rows, sizes),)](
+            count = programs(len(rows), sizes["TILE"], rows.device)
+            step_kernels.forward_kernel[(count,)](
                 *tensors,
                 out,
                 neighbours.shape[1],
@@ -192,17 +191,17 @@ class _Update(torch.autograd.Function):
         hidden = weights[0]
         n, channels, units = neighbours.shape[1], state.shape[1], len(hidden)
         sizes = _sizes(state, priors, hidden, WEIGHT_BYTES[1])
-        programs = _programs(rows, sizes)
+        count = programs(len(rows), sizes["TILE"], rows.device)
         # Unsummed gradients of W1ᵀ, b1 and W2, one below the other.
         partials = state.new_empty(
-            (programs, hidden.shape[1] + 1 + channels, units), dtype=torch.float32
+            (count, hidden.shape[1] + 1 + channels, units), dtype=torch.float32
         )
         to_perceived = state.new_empty(len(rows), FILTERS * channels)
         place = torch.full((n,), -1, dtype=torch.int32, device=state.device)
         to_state = torch.empty_like(state)
         with torch.cuda.device_of(state):
-            if programs:
-                step_kernels.weights_kernel[(programs,)](
+            if count:
+                step_kernels.weights_kernel[(count,)](
                     *tensors,
                     gradient,
                     to_perceived,
@@ -256,11 +255,44 @@ def _sizes(state: Tensor, priors: Tensor, hidden: Tensor, weight_bytes: int) -> 
     }
 
 
-def _programs(rows: Tensor, sizes: dict[str, int]) -> int:
+def default_precision() -> Precision:
+    """Of float32 products, unless one is asked for: what torch is told to be enough."""
+    return "tf32x3" if torch.get_float32_matmul_precision() == "highest" else "tf32"
+
+
+def programs(count: int, tile: int, device: torch.device) -> int:
+    """How many programs take tiles of so many cells or points in turns."""
     processors = 1
-    if rows.device.type == "cuda":
-        processors = torch.cuda.get_device_properties(rows.device).multi_processor_count
-    return min(triton.cdiv(len(rows), sizes["TILE"]), PROGRAMS * processors)
+    if device.type == "cuda":
+        processors = torch.cuda.get_device_properties(device).multi_processor_count
+    return min(triton.cdiv(count, tile), PROGRAMS * processors)
+
+
+def require_layout(
+    operation: str, arrays: Mapping[str, tuple[Tensor, tuple[int, ...]]], indices: Collection[str]
+) -> None:
+    """Refuse arrays that kernels cannot read.
+
+    Args:
+        operation: What a message calls it.
+        arrays: Each with the shape expected, by name; all are to be where the first is.
+        indices: Names of those that hold int32.
+
+    Raises:
+        ShapeError: Naming the first of another shape, type or place.
+    """
+    where = next(iter(arrays.values()))[0].device
+    for name, (tensor, shape) in arrays.items():
+        whole = name in indices
+        if tuple(tensor.shape) != shape:
+            problem = f"expected shape {shape}, got {tuple(tensor.shape)}"
+        elif tensor.dtype not in ((torch.int32,) if whole else TYPES):
+            problem = f"expected {'int32' if whole else 'float32 or shorter'}, got {tensor.dtype}"
+        elif tensor.device != where:
+            problem = f"expected on {where} like the state, got {tensor.device}"
+        else:
+            continue
+        raise ShapeError(f"{operation}: {name}: {problem}")
 
 
 def _check(
@@ -279,17 +311,7 @@ def _check(
         "hidden bias": (weights.bias, (h,)),
         "output weights": (weights.output, (c, h)),
     }
-    for name, (tensor, shape) in shapes.items():
-        indices = name in ("rows", "neighbours")
-        if tuple(tensor.shape) != shape:
-            problem = f"expected shape {shape}, got {tuple(tensor.shape)}"
-        elif tensor.dtype not in ((torch.int32,) if indices else TYPES):
-            problem = f"expected {'int32' if indices else 'float32 or shorter'}, got {tensor.dtype}"
-        elif tensor.device != state.device:
-            problem = f"expected on {state.device} like the state, got {tensor.device}"
-        else:
-            continue
-        raise ShapeError(f"update step: {name}: {problem}")
+    require_layout("update step", shapes, ("rows", "neighbours"))
     if not (1 <= c <= MOST_CHANNELS and p <= MOST_PRIORS and h >= 1):
         raise ShapeError(
             f"update step: {c} channels, {p} priors, {h} hidden units: the Triton kernels work "

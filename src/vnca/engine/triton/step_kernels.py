@@ -82,15 +82,8 @@ def hidden_inputs(
     wanted = inside[:, None] & (columns < P)
     p = tl.load(priors + rows[:, None] * P + columns, mask=wanted, other=0).to(tl.float32)
     p = tl.where(inside[:, None] & (columns == P), 1.0, p)
-    number: tl.constexpr = state.dtype.element_ty
-    return (
-        own.to(number),
-        x.to(number),
-        y.to(number),
-        z.to(number),
-        laplacian.to(number),
-        p.to(number),
-    )
+    kind: tl.constexpr = state.dtype.element_ty
+    return own.to(kind), x.to(kind), y.to(kind), z.to(kind), laplacian.to(kind), p.to(kind)
 
 
 @triton.jit
