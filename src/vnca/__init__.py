@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from vnca.recipe.texture import texture
     from vnca.rendering.view import View
     from vnca.rendering.view import render as render_view
+    from vnca.rule.conditioning import Conditioning, register_conditioning
     from vnca.rule.model import Model
     from vnca.rule.rule import Rule, RuleConfig, Scales
     from vnca.simulation import simulate as simulate_smoke
@@ -60,6 +61,8 @@ _HOMES = {
     "Watch": "core.watch",
     "Cancelled": "core.errors",
     "Box": "core.typing",
+    "Conditioning": "rule.conditioning",
+    "register_conditioning": "rule.conditioning",
     "FilmWriter": "io.film",
     "Lattice": "core.lattice",
     "Model": "rule.model",
@@ -98,6 +101,7 @@ __all__ = [
     "PRESETS",
     "Box",
     "Cancelled",
+    "Conditioning",
     "Evaluation",
     "FilmConfig",
     "FilmWriter",
@@ -127,6 +131,7 @@ __all__ = [
     "open_vdb",
     "read_image",
     "read_smoke",
+    "register_conditioning",
     "render",
     "render_view",
     "simulate",

@@ -18,6 +18,8 @@ from vnca.core.errors import FileFormatError, ModelError, OptionError, OutputErr
 from vnca.core.lattice import Lattice, Region
 from vnca.core.typing import AnyArray, Box
 from vnca.io.smoke_format import SmokeFormat
+from vnca.rule import conditioning
+from vnca.rule.conditioning import Conditioning, register_conditioning
 from vnca.rule.decoder import Decoder
 from vnca.rule.model import MODEL_NAME, Model, from_record
 from vnca.rule.rule import Rule, RuleConfig, Scales
@@ -185,7 +187,7 @@ def rewritten(path: Path, **changes: Any) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"format_version": 3}, r"newer than this vnca reads.*upgrade"),
+        ({"format_version": 4}, r"newer than this vnca reads.*upgrade"),
         ({"format_version": "one"}, "damaged"),
         ({"rule": None}, "damaged"),
         ({"rule": 3}, "damaged"),
@@ -354,3 +356,41 @@ def test_impossible_hyperparameters_name_their_option(wrong: dict[str, float]) -
     (name,) = wrong
     with pytest.raises(OptionError, match=f"`{name}`"):
         RuleConfig(**wrong)  # type: ignore[arg-type]
+
+
+def test_a_model_lists_what_it_is_conditioned_on(
+    model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / MODEL_NAME
+    model.save(path)
+    with safe_open(path, framework="numpy") as file:
+        described = json.loads(file.metadata()["vnca"])
+    assert described["conditioning"] == [["position", 3], ["density", 1], ["velocity", 3]]
+    rewritten(path, conditioning=None)  # as older ones are
+    assert Model.load(path).rule.config == model.rule.config
+
+    monkeypatch.setattr(conditioning, "_KNOWN", dict(conditioning._KNOWN))
+    register_conditioning(Conditioning.of_field("heat", width=2))
+    config = replace(model.rule.config, conditioning=("velocity", "heat"))
+    own = Model(Rule.initial(config, model.rule.scales, seed=1))
+    own.save(path)
+    assert version_of(path) == 3
+    assert Model.load(path).rule.config == config
+    register_conditioning(Conditioning.of_field("heat"))
+    with pytest.raises(ModelError, match=r"heat of 2 numbers, and what is known .* has 1"):
+        Model.load(path)
+    monkeypatch.undo()
+    with pytest.raises(ModelError, match="conditioned on heat, which this program does not know"):
+        Model.load(path)
+
+
+@pytest.mark.parametrize(
+    "listed", [3, "position", [["position"]], [[3, 3]], [["density", 1.0]], [["density", 1]] * 2]
+)
+def test_a_list_of_inputs_that_is_none_is_damage(
+    model: Model, tmp_path: Path, listed: object
+) -> None:
+    model.save(tmp_path / MODEL_NAME)
+    rewritten(tmp_path / MODEL_NAME, conditioning=listed)
+    with pytest.raises(ModelError, match="damaged"):
+        Model.load(tmp_path)

@@ -1,7 +1,7 @@
 """One frame of smoke, whatever file it came from."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -90,6 +90,8 @@ class Volume:
         index_to_world: 4×4, `world = index_to_world @ (i, j, k, 1)` for cell centres. The world is
             the file's, turned so that up is +z where it is another axis.
         frame: Frame number in its sequence.
+        fields: What else there is at the cells, by name, such as a temperature: numbers, each an
+            array `[x, y, z]` or `[x, y, z, c]`, or a field. A rule can be conditioned on them.
     """
 
     density: FloatArray
@@ -97,6 +99,7 @@ class Volume:
     origin: Index
     index_to_world: AnyArray
     frame: int
+    fields: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         density, velocity = shape_of(self, "density"), shape_of(self, "velocity")
@@ -106,15 +109,26 @@ class Volume:
             raise ShapeError(
                 f"velocity: expected {(*density, 3)} to match the density, got {velocity}"
             )
+        for name, values in self.fields.items():
+            if values.shape[:3] != density or len(values.shape) > 4:
+                raise ShapeError(
+                    f"fields: {name}: expected {density} to match the density, perhaps with a last "
+                    f"axis of components, got {values.shape}"
+                )
 
     @classmethod
     def of_fields(
-        cls, density: Field, velocity: Field | None, index_to_world: AnyArray, frame: int
+        cls,
+        density: Field,
+        velocity: Field | None,
+        index_to_world: AnyArray,
+        frame: int,
+        fields: Mapping[str, Field] | None = None,
     ) -> "Volume":
-        """Smoke given by where there is any; both fields cover one box."""
+        """Smoke given by where there is any; all fields cover one box."""
         smoke: Any = density
         motion: Any = velocity
-        return cls(smoke, motion, density.origin, index_to_world, frame)
+        return cls(smoke, motion, density.origin, index_to_world, frame, fields or {})
 
     @property
     def box(self) -> Box:
@@ -132,6 +146,14 @@ class Volume:
     def velocity_field(self) -> Field | None:
         """The velocity where there is any."""
         return field_of(self, "velocity", self.origin)
+
+    @cached_property
+    def named_fields(self) -> Mapping[str, Field]:
+        """`fields`, each where it is not zero."""
+        return {
+            name: held if isinstance(held, Field) else Field.from_dense(held, self.origin)
+            for name, held in self.fields.items()
+        }
 
     @property
     def voxel_size(self) -> tuple[float, float, float]:
@@ -168,6 +190,7 @@ class Volume:
             velocity,
             refined_transform(self.index_to_world, factor),
             self.frame,
+            {name: refined(held, factor) for name, held in self.named_fields.items()},
         )
 
 

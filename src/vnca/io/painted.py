@@ -11,7 +11,6 @@ from vnca.core.field import Field, divided
 from vnca.core.lattice import Lattice, Placement
 from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume, refined_transform
-from vnca.io.npz import read_npz_smoke
 from vnca.io.provenance import Provenance, without_provenance
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
@@ -20,6 +19,7 @@ from vnca.io.smoke_format import (
     UpAxis,
     on_lattice,
     own_cells,
+    reader_of,
     up_axis_of,
     upright_world,
 )
@@ -93,7 +93,7 @@ def write_painted(
     if not isinstance(colour, Field):
         colour = Field.from_dense(colour, box.lower)
     frame = _Painting(density, colour, lattice, up_axis_of(source, format), refine)
-    write = _paint_npz if source.suffix.lower() == ".npz" else _paint_vdb
+    write = _paint_vdb if source.suffix.lower() == ".vdb" else _paint_other
     write(path, source, format, frame, colour_grids, provenance.metadata if provenance else {})
 
 
@@ -283,7 +283,7 @@ def _paint_vdb(
         write_vdb(path, grids, metadata=about)
 
 
-def _paint_npz(
+def _paint_other(
     path: str | Path,
     source: str | Path,
     format: SmokeFormat,
@@ -291,7 +291,7 @@ def _paint_npz(
     colour_grids: Sequence[str],
     told: Mapping[str, Entry],
 ) -> None:
-    stored = read_npz_smoke(Path(source), format)
+    stored = reader_of(Path(source)).read(Path(source), format)
     transform = Transform.from_matrix(stored.index_to_world)
     before = stored.density
     density, colour = frame.in_file(transform, before, str(source))
@@ -317,6 +317,7 @@ def _paint_npz(
                 velocity.stored,
                 transform=transform,
                 grid_class="staggered" if all(velocity.staggered) else None,
+                metadata={UNITS_METADATA: CELLS_PER_FRAME} if velocity.in_cells_per_frame else {},
             )
         )
     write_vdb(path, grids, metadata=told)

@@ -6,14 +6,15 @@ whose index axes are exchanged or mirrored, too, cells go to the right, back and
 same way back.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from vnca.core.errors import GridError
+from vnca.core.errors import FileFormatError, GridError, OptionError
 from vnca.core.field import Field
 from vnca.core.lattice import Lattice, Placement, upright_turn
 from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
@@ -29,8 +30,9 @@ NOT_WANTED = "`velocity_grid` none says that none is wanted"
 # What a velocity grid's metadata says of its units, where it was written by vnca.
 UNITS_METADATA = "velocity_units"
 CELLS_PER_FRAME: VelocityUnits = "cells/frame"
-# Files of smoke by suffix, and which of their axes points up unless the user says otherwise.
-UP_AXES: dict[str, UpAxis] = {".vdb": "z", ".npz": "y"}
+# Files of smoke by suffix, and the module whose `READER` reads them.
+_HOMES = {".vdb": "vnca.io.vdb_smoke", ".npz": "vnca.io.npz"}
+_READERS: dict[str, "Reader"] = {}
 
 
 def upright_world(index_to_world: AnyArray, up: UpAxis) -> AnyArray:
@@ -72,7 +74,8 @@ def on_lattice(smoke: Volume, lattice: Lattice, what: str) -> Volume:
         velocity = place.field(velocity, over, "nearest")
         velocity = replace(velocity, values=place.vectors(velocity.values))
     density = place.field(smoke.density_field, over)
-    return Volume.of_fields(density, velocity, lattice.to_world, smoke.frame)
+    fields = {name: place.field(held, over) for name, held in smoke.named_fields.items()}
+    return Volume.of_fields(density, velocity, lattice.to_world, smoke.frame, fields)
 
 
 def on_one_lattice(frames: Iterable[Volume]) -> Iterator[Volume]:
@@ -117,6 +120,10 @@ class SmokeFormat:
     velocity_scale: float | Literal["fit"] = 1.0
     """A further factor on the velocity; "fit" finds it by carrying frames onto their next."""
 
+    fields: tuple[str, ...] = ()
+    """Further grids of numbers to read, such as temperature, on the cells of the density: for rules
+    that are conditioned on them."""
+
     up_axis: UpAxis | None = None
     """Which axis of the file points up. By default z in VDB files, y in npz files."""
 
@@ -156,16 +163,70 @@ class StoredSmoke:
         density: Over the box of its cells, finite.
         index_to_world: 4×4.
         velocity: None where the file has none, or it is not wanted.
+        fields: What else was asked for, by name, over the same cells.
     """
 
     density: Field
     index_to_world: AnyArray
     velocity: StoredVelocity | None
+    fields: Mapping[str, Field] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A file format that holds smoke.
+
+    Attributes:
+        read: Reads a frame in the axes of its file.
+        extent: The cells that hold smoke, in the axes of the file.
+        where_velocity_is: What to tell whoever expected velocity in a frame that has none.
+        up_axis: Which axis of the file points up unless the user says otherwise.
+    """
+
+    read: Callable[[Path, SmokeFormat], StoredSmoke]
+    extent: Callable[[Path, SmokeFormat], Extent]
+    where_velocity_is: Callable[[Path], str]
+    up_axis: UpAxis
+
+
+def suffixes() -> tuple[str, ...]:
+    """Of the files that can be read, in small letters: `.vdb`, `.npz`, and what was registered."""
+    return tuple({**_HOMES, **_READERS})
+
+
+def register_reader(suffix: str, reader: Reader) -> None:
+    """Read files of a suffix so, from here on.
+
+    Raises:
+        OptionError: If the suffix is none, or one of vnca's own.
+    """
+    if suffix in _HOMES or suffix.lower() != suffix or not suffix.startswith("."):
+        raise OptionError(
+            f"`suffix` {suffix!r}: expected one such as '.smoke' in small letters, other than "
+            f"{' and '.join(_HOMES)}"
+        )
+    _READERS[suffix] = reader
+
+
+def reader_of(path: Path) -> Reader:
+    """What reads a file, by its suffix.
+
+    Raises:
+        FileFormatError: If no format has it.
+    """
+    suffix = path.suffix.lower()
+    if suffix in _HOMES:
+        return import_module(_HOMES[suffix]).READER
+    if suffix not in _READERS:
+        raise FileFormatError(
+            f"{path}: expected a file of smoke ({', '.join(suffixes())}), got {suffix or 'none'}"
+        )
+    return _READERS[suffix]
 
 
 def up_axis_of(path: Path, format: SmokeFormat) -> UpAxis:
     """Which axis of the file points up, by the format or else by the file's suffix."""
-    return format.up_axis or UP_AXES[path.suffix.lower()]
+    return format.up_axis or reader_of(path).up_axis
 
 
 def upper_grown(box: Box) -> Box:

@@ -14,6 +14,7 @@ from vnca.io.smoke_format import (
     NOT_WANTED,
     UNITS_METADATA,
     Extent,
+    Reader,
     SmokeFormat,
     StoredSmoke,
     StoredVelocity,
@@ -48,6 +49,7 @@ def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
             density,
             header.transform.index_to_world,
             _read_velocity(file, format, density, header.transform),
+            {name: _read_field(file, name, density, header.transform) for name in format.fields},
         )
 
 
@@ -119,6 +121,27 @@ def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, 
             "make inactive what is no smoke, or resample the grid"
         )
     return header, grid, box
+
+
+def _read_field(file: VdbFile, name: str, density: Field, place: Transform) -> Field:
+    """A further grid of numbers at the cells of the density, zero where it is inactive.
+
+    Raises:
+        GridError: If it is missing, holds no numbers, or has other cells.
+    """
+    if name not in file.names:
+        raise GridError(f"{file.path}: no grid {name!r}; choose `fields` from {file.listed()}")
+    header = file.grids[name]
+    label = f"{file.path}: grid {name!r}"
+    if components(header) != 1:
+        raise GridError(f"{label} holds {header.value_type}, expected numbers; see `fields`")
+    ours, theirs = (each.index_to_world for each in (place, header.transform))
+    if not np.allclose(np.linalg.solve(ours, theirs), np.eye(4), atol=_CELL_TOLERANCE):
+        raise GridError(
+            f"{label} has other cells than the density; resample it onto those, or leave it out of "
+            "`fields`"
+        )
+    return _finite(header, header.read(), density.box, near=density.bricks)[0]
 
 
 def _read_velocity(
@@ -211,3 +234,6 @@ def _finite(
 
 def _extent(box: Box) -> str:
     return f"cells {box.lower} to {box.upper}"
+
+
+READER = Reader(read_vdb_smoke, vdb_smoke_extent, where_vdb_velocity_is, up_axis="z")

@@ -9,7 +9,7 @@ from vnca.core.typing import AnyArray, FloatArray
 from vnca.engine.domain import Domain
 from vnca.engine.session import Compute, open_session
 from vnca.rule.paint import colours
-from vnca.rule.rule import PRIORS, Rule
+from vnca.rule.rule import Rule
 
 SMALLEST, LARGEST = 8, 384
 """Cells along an edge."""
@@ -41,7 +41,7 @@ def grow(
     """Grow a block from nothing, and let it live on: one block after the other, without end.
 
     Args:
-        rule: Cells are told nothing but their neighbourhood: its priors are zero here.
+        rule: Cells are told nothing but their neighbourhood: its conditioning is zero here.
         size: Cells along an edge.
         steps: Steps before the first block.
         seed: Same seed, same machine, same block.
@@ -53,7 +53,7 @@ def grow(
         Linear RGB `[size, size, size, 3]`.
     """
     domain = block_domain(size)
-    nothing = np.zeros((len(domain), PRIORS), np.float32)
+    nothing = np.zeros((len(domain), rule.config.conditioning_width), np.float32)
     session = open_session(rule.automaton(seed), domain, nothing, compute)
     state = session.upload(domain.seed(rule.config.channels))
     done, waiting = 0, steps

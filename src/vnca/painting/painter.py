@@ -186,7 +186,7 @@ class Painter:
     def _tell_without_velocity(self, read: _Read) -> None:
         """Say once that the rule wants a velocity which a frame does not have."""
         if (
-            self.roll.rule.config.velocity_prior
+            self.roll.rule.config.is_conditioned_on("velocity")
             and self.smoke.velocity_grid != NO_VELOCITY
             and read.smoke.velocity_field is None
             and not read.smoke.box.is_empty

@@ -221,7 +221,7 @@ def placed(rule: Rule, region: Region, watch: Watch) -> Rule:
     A rule that is conditioned on position would else see the same position in all cells; a note
     says so.
     """
-    if rule.place is None or not rule.config.position_prior:
+    if rule.place is None or not rule.config.is_conditioned_on("position"):
         return rule
     there = rule.place.lattice.to_world
     place = Placement.between(region.lattice.to_world, there, region.box, "the sequence")

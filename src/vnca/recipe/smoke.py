@@ -233,7 +233,8 @@ def run(
         share = SHARES[options.preset] if options.texture is None else options.texture
         beginning = pretraining_config(config, share, trainer.picture_cells)
         if options.begin_with is not None:
-            trainer.begin_with(without_prior_weights(_given(options.begin_with, config.rule)))
+            texture = _given(options.begin_with, config.rule)
+            trainer.begin_with(without_prior_weights(texture, config.rule.conditioning))
         elif beginning is not None:
             if checkpoint is None and options.overwrite and options.out is not None:
                 # Resuming must not take the texture of the run that was there for this one's.

@@ -19,7 +19,7 @@ class Scene(ABC, Generic[Viewpoint]):
 
     Attributes:
         domain: The cells that live.
-        priors: `[n, 7]`.
+        priors: `[n, P]`, what the rule is conditioned on.
         samples: About how many are taken along the ray of a pixel.
         width: Cells across a picture.
         paints_density: Whether a rule may change the density. If not, its weights that would do
@@ -32,7 +32,7 @@ class Scene(ABC, Generic[Viewpoint]):
     def __init__(
         self, domain: Domain, priors: FloatArray, device: torch.device | str, *, width: float
     ) -> None:
-        """Put the cells and what they are told, `[n, 7]`, where is computed."""
+        """Put the cells and what they are told, `[n, P]`, where is computed."""
         self.domain, self.width = domain, width
         self.priors = torch.from_numpy(priors).to(device)
         self._places = torch.from_numpy(domain.places).to(device)

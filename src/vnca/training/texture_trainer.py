@@ -39,7 +39,10 @@ def texture_trainer(
     Raises:
         OptionError: If the memory budget is not enough.
     """
-    scene = BlockScene(config.block, config.slices, mesh=mesh, device=device)
+    told = config.rule.conditioning_width
+    scene = BlockScene(
+        config.block, config.slices, conditioning_width=told, mesh=mesh, device=device
+    )
     rule = initial_rule(config)
     return Trainer(scene, rule, style, config, network, memory_budget=memory_budget)
 

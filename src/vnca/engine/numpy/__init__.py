@@ -46,10 +46,11 @@ class NumpyBackend(Backend):
 
     def session(self, job: Job) -> Session:
         """See `Backend.session`."""
-        return StepSession.open(job, draw=_draw, update=update)
+        return StepSession.open(job, draw=draw, update=update)
 
 
-def _draw(hashes: IntArray, *, seed: int, step: int, probability: float) -> IntArray:
+def draw(hashes: IntArray, *, seed: int, step: int, probability: float) -> IntArray:
+    """Rows `[m]` of the cells that change; `hashes` `[n]` are the bits of `hash_cells` as int32."""
     bits = hashes.view(np.uint32)
     return changing_rows(bits, seed=seed, step=step, probability=probability)
 

@@ -20,8 +20,8 @@ from vnca.rendering.brightness import gamma_for_own_colour
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
 from vnca.rendering.velocity import projected_velocity
 from vnca.rendering.view import View, render
-from vnca.rule.conditioning import DENSITY, VELOCITY, normalised_velocity, priors
 from vnca.rule.conditioning import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
+from vnca.rule.conditioning import normalised_velocity, priors
 from vnca.rule.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
 from vnca.training.scene import Scene
 from vnca.training.smoke_config import ViewConfig
@@ -137,10 +137,12 @@ class SmokeScene(Scene[SmokeViewpoint]):
         scene = copy.copy(self)
         scene.velocity = torch.from_numpy(velocity).to(self.velocity)
         scene.priors = self.priors.clone()
-        scene.priors[:, VELOCITY] = told.to(self.priors)
-        if self._rule.config.density_prior:
+        config = self._rule.config
+        if (where := config.columns("velocity")) is not None:
+            scene.priors[:, where] = told.to(self.priors)
+        if (where := config.columns("density")) is not None:
             density = (self._density * denser).clamp_max(TOLD_DENSITY_LIMIT)
-            scene.priors[:, DENSITY] = density[:, None]
+            scene.priors[:, where] = density[:, None]
         return scene
 
     def camera(

@@ -73,6 +73,7 @@ class BlockScene(Scene[list[Cut]]):
         size: int,
         slices: SliceConfig,
         *,
+        conditioning_width: int = PRIORS,
         mesh: Mesh | None = None,
         device: torch.device | str = "cpu",
     ) -> None:
@@ -81,6 +82,7 @@ class BlockScene(Scene[list[Cut]]):
         Args:
             size: Cells along an edge.
             slices: How it is looked at.
+            conditioning_width: Numbers that a cell of the rule is told: all are zero here.
             mesh: Seen from all sides beside the slices; a pixel shows about a cell.
             device: Where rollouts and pictures are computed.
 
@@ -88,7 +90,7 @@ class BlockScene(Scene[list[Cut]]):
             OptionError: If the size cannot work.
         """
         domain = block_domain(size)
-        nothing = np.zeros((len(domain), PRIORS), np.float32)
+        nothing = np.zeros((len(domain), conditioning_width), np.float32)
         super().__init__(domain, nothing, device, width=float(slices.size))
         self.slices = slices
         self.views = mesh_views(mesh, slices.size) if mesh is not None else []
