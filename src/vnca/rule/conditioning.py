@@ -36,11 +36,14 @@ class Conditioning:
         width: How many numbers a cell.
         values: What the cells of a domain are told of a frame, `[n, width]`, from domain, smoke and
             rule; about as large as 1. It is called once a frame.
+        scale: Of a named field the value that counts as 1; such an input needs nothing but what a
+            model file holds. None of what is computed.
     """
 
     name: str
     width: int
     values: Callable[[Domain, Volume, "Rule"], FloatArray]
+    scale: float | None = None
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():
@@ -74,7 +77,12 @@ class Conditioning:
             told = field.gather(domain.cells).reshape(len(domain), -1) / scale
             return told.astype(np.float32)
 
-        return cls(name, width, values)
+        return cls(name, width, values, scale)
+
+
+def is_known(name: str) -> bool:
+    """Whether an input of a name is registered, or one of vnca's own."""
+    return name in _KNOWN
 
 
 def conditioning_named(name: str) -> Conditioning:

@@ -18,7 +18,12 @@ from vnca.core.files import existing_file, whole_file
 from vnca.core.lattice import Lattice, Region
 from vnca.core.typing import Box, FloatArray
 from vnca.engine.decode_weights import Weights
-from vnca.rule.conditioning import conditioning_named
+from vnca.rule.conditioning import (
+    Conditioning,
+    conditioning_named,
+    is_known,
+    register_conditioning,
+)
 from vnca.rule.decoder import Decoder
 from vnca.rule.rule import CONDITIONING, Rule, RuleConfig, Scales
 
@@ -67,7 +72,7 @@ class Model:
         """
         decoder = self.rule.decoder
         shape = dataclasses.asdict(self.rule.config)
-        listed = [[name, conditioning_named(name).width] for name in shape.pop("conditioning")]
+        listed = list(map(_listed, shape.pop("conditioning")))
         weights = {name: getattr(self.rule, name) for name in _WEIGHTS}
         weights |= dict(zip(_DECODER, decoder.weights, strict=True)) if decoder else {}
         tensors: dict[str, NDArray[Any]] = {
@@ -164,28 +169,37 @@ def _conditioning(path: Path, record: Any) -> tuple[str, ...]:
     """What a rule is conditioned on; models that do not list it are older than the list.
 
     Raises:
-        ValueError: If it is no list of names and widths.
+        ValueError: If it is no list of names, widths and scales.
         ModelError: If this program does not know one of them, or another of its name.
     """
     if record is None:
         return CONDITIONING
+    if not isinstance(record, list):
+        raise ValueError(f"conditioning {record!r}")
     for entry in record:
-        name, width = entry
-        if not isinstance(name, str) or type(width) is not int:
+        name, width, *scale = entry
+        numbers = all(type(each) in (int, float) for each in scale)
+        if not isinstance(name, str) or type(width) is not int or len(scale) > 1 or not numbers:
             raise ValueError(f"conditioning {entry!r}")
-        try:
-            known = conditioning_named(name)
-        except OptionError:
+        if scale and not is_known(name):
+            register_conditioning(Conditioning.of_field(name, width=width, scale=scale[0]))
+        elif not is_known(name):
             raise ModelError(
                 f"{path}: the rule is conditioned on {name}, which this program does not know; "
                 "make it known with `vnca.register_conditioning` before"
-            ) from None
-        if known.width != width:
-            raise ModelError(
-                f"{path}: the rule is conditioned on {name} of {width} numbers, and what is known "
-                f"by that name has {known.width}"
             )
-    return tuple(name for name, _ in record)
+        if _listed(name) != entry:
+            raise ModelError(
+                f"{path}: the rule is conditioned on {entry} (name, width and scale), and what is "
+                f"known by that name is {_listed(name)}"
+            )
+    return tuple(name for name, *_ in record)
+
+
+def _listed(name: str) -> list[Any]:
+    """An input as a model lists it: its name and width, and the scale of a named field."""
+    known = conditioning_named(name)
+    return [name, known.width, *([] if known.scale is None else [known.scale])]
 
 
 def _described(place: Region | None) -> dict[str, Any]:
