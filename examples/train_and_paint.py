@@ -43,7 +43,12 @@ def main(out: str = "example", iterations: str = "250") -> None:
             watch=watch,
         )
         painting = vnca.stylize(
-            model, folder / "smoke", out=folder / "painted", frames="12-24", watch=watch
+            model,
+            folder / "smoke",
+            out=folder / "painted",
+            overwrite=True,
+            frames="12-24",
+            watch=watch,
         )
         for frame in painting:
             print(f"frame {frame.number}: {frame.path}")

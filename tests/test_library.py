@@ -73,5 +73,5 @@ def test_type_checkers_see_the_same_names() -> None:
 
 
 def test_other_names_are_refused() -> None:
-    with pytest.raises(AttributeError, match=r"vnca.*'paint'"):
-        vnca.paint  # type: ignore[attr-defined]  # noqa: B018
+    with pytest.raises(AttributeError, match=r"vnca.*'draw'"):
+        vnca.draw  # type: ignore[attr-defined]  # noqa: B018

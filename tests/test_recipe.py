@@ -131,6 +131,9 @@ def test_memory_and_files_give_the_same(cache: Path, picture: Path, tmp_path: Pa
     view = {"rows": 32, "columns": 32}
     vnca.render(tmp_path / "out", tmp_path / "a_####.png", film=view)
     vnca.render(kept, tmp_path / "b_####.png", film=view)
+    for idle in ({"gamma": 2.0}, {"strip": 1}, {"colour_grid": "color"}, {"up_axis": "y"}):
+        with pytest.raises(vnca.VncaError, match=f"`{next(iter(idle))}`: needs a sequence"):
+            vnca.render(kept, tmp_path / "c_####.png", **idle)
     for number in (1, 2):
         one, other = (read_image(tmp_path / f"{kind}_000{number}.png") for kind in "ab")
         np.testing.assert_allclose(one, other, atol=2 / 255)
@@ -185,7 +188,7 @@ def test_who_stops_asking_can_resume_too(cache: Path, model: Path, tmp_path: Pat
         ),
         ({"view": {"siz": 32}}, "`view.siz`: no such .*`view.size`"),
         ({"view": {"size": 3}}, "`view.size` 3"),
-        ({"preset": "best"}, "`preset` 'best': expected one of draft, standard, paper"),
+        ({"preset": "best"}, "`preset` best: expected one of draft, paper, standard"),
         ({"resume": True}, "`resume`: needs the folder"),
         ({"texture": -1}, "`texture` -1"),
         ({"iterations": "many"}, "`iterations` 'many'"),
@@ -226,7 +229,7 @@ def test_what_needs_files_says_so(tiny_smoke: Volume, model: Path, tmp_path: Pat
 def test_a_texture_is_trained_in_memory(picture: Path) -> None:
     tiny = {name: value for name, value in TINY.items() if name not in ("view", "rule")}
     rule = {"channels": 6, "hidden": 8}
-    model = vnca.texture(read_image(picture), block=16, rule=rule, slices={"size": 32}, **tiny)
+    model = vnca.texture(read_image(picture), block=16, rule=rule, slice={"size": 32}, **tiny)
     assert model.training["kind"] == "texture"
     assert model.rule.config.hidden == 8
 

@@ -29,7 +29,8 @@ from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule, RuleConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME
 from vnca.training.config import PoolConfig
-from vnca.training.smoke_config import PRESETS, SmokeConfig, ViewConfig
+from vnca.training.presets import preset
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 ROOT = Path(__file__).parents[2]
 REFERENCE = "reference"
@@ -84,7 +85,7 @@ class Study:
     @property
     def config(self) -> SmokeConfig:
         """That of the reference."""
-        plan = PRESETS["paper"] if self.full else DRAFT
+        plan = preset(SmokeConfig, "paper") if self.full else DRAFT
         return replace(
             plan,
             iterations=plan.iterations if self.iterations is None else self.iterations,
@@ -142,7 +143,6 @@ class Study:
                     preview_every=config.iterations,
                     device=str(self.place),
                     preset=self.preset,
-                    texture=0,  # as the paper trains
                     smoke=self.smoke,
                     config=config,
                 ),

@@ -33,7 +33,8 @@ from vnca.metrics.style_score import slice_distances
 from vnca.painting.block import border_jump, grow
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule
-from vnca.training.texture_config import PRESETS
+from vnca.training.presets import preset, preset_names
+from vnca.training.texture_config import TextureConfig
 from vnca.training.texture_trainer import texture_trainer
 
 
@@ -52,13 +53,18 @@ class Task:
     seed: int
 
     @property
+    def config(self) -> TextureConfig:
+        """How the rule is trained, and what the preset says of how blocks are judged."""
+        return preset(TextureConfig, self.preset)
+
+    @property
     def slice_size(self) -> int:
         """Rows and columns of a slice."""
-        return PRESETS[self.preset].slices.size
+        return self.config.slice.size
 
     def judge(self, style: FloatArray, network: FeatureNetwork) -> AppearanceLoss:
         """What the rule was trained with, for both methods."""
-        return AppearanceLoss(network, style, PRESETS[self.preset].appearance, self.slice_size)
+        return AppearanceLoss(network, style, self.config.appearance, self.slice_size)
 
     def begin(self) -> tuple[FloatArray, FeatureNetwork]:
         """The picture and the network, in the process that measures."""
@@ -75,7 +81,7 @@ class Task:
 def train(task: Task) -> tuple[Rule, dict[str, Any]]:
     """A rule trained for the time given; its learning rate falls as over that time."""
     style, network = task.begin()
-    config = replace(PRESETS[task.preset], features=task.features, seed=task.seed)
+    config = replace(task.config, features=task.features, seed=task.seed)
     if task.iterations is None:
         trial = texture_trainer(style, config, network)
         trial.improve()
@@ -99,7 +105,7 @@ def grown(task: Task, rule: Rule, size: int) -> dict[str, Any]:
     style, network = task.begin()
     began = time.process_time()
     compute = Compute(threads=task.threads)
-    block = next(grow(rule, size, steps=task.steps, seed=task.seed, compute=compute))
+    block = next(grow(rule, size, steps=task.steps, seed=task.seed, compute=compute)).colours
     made = time.process_time() - began
     return {"make_s": round(made, 1), "peak_mb": peak_mb(), **judged(task, block, style, network)}
 
@@ -163,7 +169,7 @@ def main() -> None:
     parser.add_argument(
         "--grow", type=int, nargs="*", default=[256], help="further sizes for the rule alone"
     )
-    parser.add_argument("--preset", choices=PRESETS, default="draft")
+    parser.add_argument("--preset", choices=preset_names(TextureConfig), default="draft")
     parser.add_argument(
         "--seconds", type=float, default=600.0, help="of processor time to learn, for each method"
     )

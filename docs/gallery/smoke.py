@@ -28,7 +28,7 @@ TRAINING = (
 PAINTINGS = ("vangogh_church_auvers", "vangogh_harvest")
 THUMBNAIL = 200
 """Rows and columns of the picture beside its films."""
-FILM = ("--film.rows", 200, "--film.columns", 200, "--film.fps", 12, "--film.background", "#3c3c42")
+FILM = ("--rows", 200, "--columns", 200, "--film-fps", 12, "--background", "#3c3c42")
 
 
 def main(folder: str) -> None:
@@ -52,13 +52,14 @@ def films_of(picture: Path, work: Path) -> None:
     name = picture.stem
     write_image(FILMS / f"{name}.webp", fit(read_image(picture), THUMBNAIL, THUMBNAIL))
     run = work / f"smoke_{name}"
-    how = ("--begin-with", texture_of(picture, work), *TRAINING)
+    how = ("--init", texture_of(picture, work), *TRAINING)
     made(run / "model.safetensors", "train", work / "plume" / TRAINED, picture, "--out", run, *how)
     for scene, (_, frames) in SCENES.items():
         painted, film = work / f"{name}_{scene}", FILMS / f"{name}_{scene}.webp"
         last = painted / f"{scene}_{frames:04d}.vdb"
         some = ("--frames", f"{frames // 4}-{frames}")
-        made(last, "stylize", run, work / scene, "--out", painted, "--refine", 2, *some)
+        again = ("--resume", "--overwrite")
+        made(last, "stylize", run, work / scene, "--out", painted, "--refine", 2, *again, *some)
         made(film, "render", painted, "--out", film, *FILM)
 
 

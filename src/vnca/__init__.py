@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from vnca.painting.roll import stylize as stylize_frames
     from vnca.recipe.evaluation import Evaluation, evaluate
     from vnca.recipe.film import FilmConfig
+    from vnca.recipe.paint import paint
     from vnca.recipe.recorded import load
     from vnca.recipe.rendering import render
     from vnca.recipe.simulation import simulate
@@ -40,13 +41,15 @@ if TYPE_CHECKING:
     from vnca.rule.rule import Rule, RuleConfig, Scales
     from vnca.simulation import simulate as simulate_smoke
     from vnca.training.loop import Trainer
-    from vnca.training.smoke_config import PRESETS, SmokeConfig
+    from vnca.training.presets import preset
+    from vnca.training.smoke_config import SmokeConfig
     from vnca.training.smoke_trainer import smoke_trainer
     from vnca.training.texture_config import TextureConfig
 
 # Functions that share the name of a subpackage have one of their own here: an imported
 # subpackage takes its name in this one.
 _HOMES = {
+    "paint": "recipe.paint",
     "train": "recipe.smoke",
     "texture": "recipe.texture",
     "stylize": "recipe.stylizing",
@@ -67,7 +70,6 @@ _HOMES = {
     "Lattice": "core.lattice",
     "Model": "rule.model",
     "Orthographic": "core.camera",
-    "PRESETS": "training.smoke_config",
     "Painting": "painting.roll",
     "Perspective": "core.camera",
     "Rule": "rule.rule",
@@ -84,6 +86,7 @@ _HOMES = {
     "frame_box": "core.camera",
     "load_network": "features.load",
     "open_vdb": "io.vdb",
+    "preset": "training.presets",
     "read_image": "io.picture",
     "read_smoke": "io.smoke",
     "render_view": "rendering.view:render",
@@ -98,7 +101,6 @@ _HOMES = {
 }
 
 __all__ = [
-    "PRESETS",
     "Box",
     "Cancelled",
     "Conditioning",
@@ -129,6 +131,8 @@ __all__ = [
     "load",
     "load_network",
     "open_vdb",
+    "paint",
+    "preset",
     "read_image",
     "read_smoke",
     "register_conditioning",

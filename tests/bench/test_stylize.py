@@ -23,7 +23,8 @@ def painted(tiny_smoke: Volume, tmp_path: Path) -> PaintedSequence:
     for number in (1, 2):
         moved = replace(tiny_smoke, origin=(x, y, z + number), frame=number)
         write_smoke(tmp_path / f"ball_{number}.vdb", moved)
-    return PaintedSequence.read(random_rule(8), find_frames(tmp_path), SmokeFormat(), steps=3)
+    sequence = find_frames(tmp_path)
+    return PaintedSequence.read(random_rule(8), sequence, SmokeFormat(), steps=3, tell=pytest.fail)
 
 
 def test_computing_and_files_are_timed_in_every_backend(

@@ -14,13 +14,14 @@ from vnca.engine.reference import step as reference
 from vnca.features.vgg import VGG16
 from vnca.io.picture import read_image, resize
 from vnca.losses.appearance import AppearanceConfig
-from vnca.training.smoke_config import PRESETS, ViewConfig
+from vnca.training.presets import preset
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 
 @pytest.fixture
 def training(tiny_smoke: Volume) -> Training:
     """A training of little moment."""
-    draft = PRESETS["draft"]
+    draft = preset(SmokeConfig, "draft")
     config = replace(
         draft,
         rule=replace(draft.rule, channels=6, hidden=8),

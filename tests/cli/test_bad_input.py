@@ -449,14 +449,14 @@ def test_training_options_out_of_range(
         ("--gamma", "0"),
         ("--gamma", "nan"),
         ("--density-scale", "inf"),
-        ("--film.rows", "3"),
-        ("--film.fps", "0"),
-        ("--film.fps", "inf"),
-        ("--film.field-of-view", "180"),
-        ("--film.elevation", "nan"),
-        ("--film.azimuth", "inf"),
-        ("--film.background", "blue"),
-        ("--film.background", "#12345"),
+        ("--rows", "3"),
+        ("--film-fps", "0"),
+        ("--film-fps", "inf"),
+        ("--field-of-view", "180"),
+        ("--elevation", "nan"),
+        ("--azimuth", "inf"),
+        ("--background", "blue"),
+        ("--background", "#12345"),
         ("--colour-grid", "density"),
     ],
 )
@@ -465,6 +465,14 @@ def test_stylizing_options_out_of_range(
     vnca: Vnca, smoke: Path, model: Path, out: Path, option: str, value: str
 ) -> None:
     assert option in vnca("stylize", model, smoke, "--out", out, option, value).complaint
+
+
+@pytest.mark.usefixtures("no_long_work")
+def test_a_camera_without_a_film_is_refused(
+    vnca: Vnca, smoke: Path, model: Path, out: Path
+) -> None:
+    complaint = vnca("stylize", model, smoke, "--out", out, "--film-fps", 12).complaint
+    assert "--film-fps: shapes a film; name one with --preview" in complaint
 
 
 @pytest.mark.usefixtures("no_long_work")
@@ -485,7 +493,13 @@ def test_colour_grids_that_share_a_name(vnca: Vnca, smoke: Path, model: Path, ou
         ("picture.png", ["--turntable", 4]),
         ("film.gif", ["--turntable", -1]),
         ("film.gif", ["--gamma", "nan"]),
-        ("film.gif", ["--film.background", "blue"]),
+        ("film.gif", ["--background", "blue"]),
+        ("film.gif", ["--turn", 90, "--turntable", 4]),
+        ("picture_#.png", ["--turn", 90]),
+        ("strip.png", ["--film-fps", 12, "--strip", 2]),
+        ("picture_#.png", ["--background", "#ffffff", "--transparent"]),
+        ("film.gif", ["--velocity-units", "m/s"]),
+        ("film.gif", ["--fps", 12]),
         ("picture.png", []),
     ],
 )

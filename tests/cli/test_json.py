@@ -23,7 +23,7 @@ def test_a_painting_tells_programs_of_its_progress_and_results(
     out, film = tmp_path / "painted", tmp_path / "film.gif"
     outcome = vnca(
         *("stylize", model, smoke, "-o", out, "--json-progress", "--preview", film),
-        *("--film.rows", "32", "--film.columns", "32", "--warmup", "2", "--steps-per-frame", "1"),
+        *("--rows", "32", "--columns", "32", "--warmup", "2", "--steps-per-frame", "1"),
     )
     assert (outcome.code, outcome.out) == (0, "")
     told = events(outcome.err)

@@ -11,8 +11,10 @@ import pytest
 
 from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
+from vnca.core.watch import Silent
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
+from vnca.recipe.stylizing import stylize
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.smoke_config import SmokeConfig
 
@@ -75,6 +77,89 @@ def test_velocity_that_frames_lack_is_missed_once(
     config = replace(loaded.rule.config, velocity_prior=False)
     replace(loaded, rule=replace(loaded.rule, config=config)).save(model / MODEL_NAME)
     assert ": no velocity" not in paint().err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("evaluate", "{model}", "{smoke}", "--style", "{style}", "--size", 64, "--style-scale", 1),
+        (
+            *("bench", "stylize", "--model", "{model}", "--sequence", "{smoke}", "--repeats", 1),
+            *("--backends", "numpy", "--threads", 1),
+        ),
+    ],
+    ids=["evaluate", "bench"],
+)
+def test_who_measures_painting_misses_velocity_too(
+    vnca: Vnca,
+    monkeypatch: pytest.MonkeyPatch,
+    model: Path,
+    smoke: Path,
+    style: Path,
+    command: tuple[object, ...],
+) -> None:
+    monkeypatch.setattr("vnca.metrics.survey.MOTION_SIZE", 40)
+    for number in (2, 3):
+        rename_velocity(smoke / f"ball_{number:04d}.vdb", "wind")
+    filled = [str(word).format(model=model, smoke=smoke, style=style) for word in command]
+    steps = QUICK[2:] if command[0] == "bench" else QUICK
+
+    def told(*options: object) -> list[str]:
+        outcome = vnca(*filled, *steps, *options)
+        assert outcome.code == 0, outcome.err
+        return [line for line in outcome.err.splitlines() if ": no velocity" in line]
+
+    (line,) = told()
+    assert line.startswith(f"{smoke / 'ball_0002.vdb'}: no velocity in this frame; choose with ")
+    assert "--velocity-grid from wind (vec3s)" in line
+    assert line.endswith("frames without are painted as if their smoke rested")
+    assert not told("--velocity-grid", "none")
+
+
+def test_an_ablation_of_velocity_needs_one_before_it_trains(
+    vnca: Vnca, frame: Path, style: Path, tmp_path: Path
+) -> None:
+    rename_velocity(frame, "wind")
+    complaint = vnca("ablate", frame, style, "--out", tmp_path / "runs").complaint
+    assert f"{frame}: no velocity in this frame; choose with --velocity-grid from wind" in complaint
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_timed_training_misses_velocity_too(
+    vnca: Vnca, frame: Path, style: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rename_velocity(frame, "wind")
+
+    def far_enough(*_: object, **__: object) -> None:
+        raise OptionError("far enough")
+
+    monkeypatch.setattr("vnca.cli.bench_train.measure_training", far_enough)
+    command = ("bench", "train", "--frame", frame, "--style", style, "--device", "cpu")
+    lines = vnca(*command).err.splitlines()
+    missing = f"{frame}: no velocity in this frame; choose with --velocity-grid from wind"
+    assert [line.startswith(missing) for line in lines] == [True, False]
+    assert lines[0].endswith("teaching motion is not timed")
+    assert vnca(*command, "--velocity-grid", "none").err.splitlines() == ["vnca: far enough"]
+
+
+@pytest.mark.parametrize("what", ["files", "memory"])
+def test_painting_from_python_misses_velocity_too(
+    model: Path, smoke: Path, tiny_smoke: Volume, what: str
+) -> None:
+    lines: list[str] = []
+
+    class Notes(Silent):
+        def note(self, line: str) -> None:
+            lines.append(line)
+
+    if what == "files":
+        rename_velocity(smoke / "ball_0002.vdb", "wind")
+        sequence, missing = smoke, f"{smoke / 'ball_0002.vdb'}: no velocity in this frame"
+    else:
+        still = replace(tiny_smoke, velocity=None, frame=7)
+        sequence, missing = [tiny_smoke, still, still], "frame 7: no velocity"
+    assert len(list(stylize(model, sequence, warmup=2, steps_per_frame=1, watch=Notes()))) == 3
+    assert [line.startswith(missing) for line in lines if "no velocity" in line] == [True]
 
 
 @pytest.mark.parametrize("names", [("Velocity",), ("VEL",)])

@@ -4,8 +4,7 @@ from contextlib import redirect_stderr
 import pytest
 
 from vnca.cli import main
-from vnca.cli.options import say
-from vnca.cli.progress import Progress, tracked
+from vnca.cli.terminal import Progress, say, tracked
 from vnca.core.errors import SequenceError
 
 

@@ -9,7 +9,7 @@ from PIL import Image
 from vnca.io.vdb import Grid, open_vdb, write_vdb
 
 Vnca = Callable[..., Any]
-SIZE = ("--film.rows", 32, "--film.columns", 40)
+SIZE = ("--rows", 32, "--columns", 40)
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def test_a_film_has_a_picture_a_frame(render: Callable[..., Path]) -> None:
 
 def test_a_film_in_mp4_can_be_decoded(render: Callable[..., Path]) -> None:
     av = pytest.importorskip("av")
-    with av.open(str(render("film.mp4", "--film.fps", 12))) as film:
+    with av.open(str(render("film.mp4", "--film-fps", 12))) as film:
         frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
         assert film.streams.video[0].average_rate == 12
     assert [frame.shape for frame in frames] == [(32, 40, 3)] * 3
@@ -78,7 +78,7 @@ def test_one_frame_is_one_picture(render: Callable[..., Path]) -> None:
 
 
 def test_the_background_is_the_one_asked_for(render: Callable[..., Path]) -> None:
-    image = pixels(render("one.png", "--frames", "2", "--film.background", "#ff8000"))
+    image = pixels(render("one.png", "--frames", "2", "--background", "#ff8000"))
     np.testing.assert_allclose(image[0, 0], [1, 128 / 255, 0], atol=0.01)
 
 

@@ -155,7 +155,7 @@ def test_a_frame_without_smoke_passes_through(painted: Paint, smoke: Path, cells
         nothing = np.zeros((cells,) * 3, np.float32)
         empty = Grid.from_dense("density", nothing, nothing == 0, (0, 6, 12), like=density)
         write_vdb(path, [empty, file.grids["velocity"], file.grids["temperature"]])
-    film = ("--preview", smoke.parent / "film.gif", "--film.rows", 32, "--film.columns", 32)
+    film = ("--preview", smoke.parent / "film.gif", "--rows", 32, "--columns", 32)
     out = painted(*film)
     after = grids(out / path.name)
     assert list(after) == ["density", "velocity", "temperature", "Cd"]
@@ -173,7 +173,7 @@ def test_a_file_without_grids_is_a_frame_without_smoke(
 ) -> None:
     name = f"ball_000{number}.vdb"
     write_vdb(smoke / name, [], {"shot": "shot 2"})
-    film = ("--preview", smoke.parent / "film.gif", "--film.rows", 32, "--film.columns", 32)
+    film = ("--preview", smoke.parent / "film.gif", "--rows", 32, "--columns", 32)
     out = painted(*film)
     with open_vdb(out / name) as file:
         assert file.names == ()
@@ -224,7 +224,7 @@ def test_a_rule_sees_the_same_smoke_whatever_axis_is_up(
 def test_a_finer_painting_has_finer_smoke_and_all_else_as_it_was(
     painted: Paint, vnca: Vnca, smoke: Path, tmp_path: Path
 ) -> None:
-    size = ("--film.rows", 32, "--film.columns", 32)
+    size = ("--rows", 32, "--columns", 32)
     out = painted("--refine", 2, "--preview", tmp_path / "film.gif", *size)
     before, after = (grids(folder / "ball_0002.vdb") for folder in (smoke, out))
     assert list(after) == [*before, "Cd"]
@@ -282,8 +282,8 @@ def test_a_preview_has_a_picture_a_frame(painted: Paint, tmp_path: Path) -> None
     from PIL import Image
 
     film = tmp_path / "film.gif"
-    size = ("--film.rows", 32, "--film.columns", 48)
-    painted("--preview", film, *size, "--film.turn", 90, "--gamma", 2)
+    size = ("--rows", 32, "--columns", 48)
+    painted("--preview", film, *size, "--turn", 90, "--gamma", 2)
     with Image.open(film) as pictures:
         assert pictures.size == (48, 32)
         assert getattr(pictures, "n_frames", 1) == 3

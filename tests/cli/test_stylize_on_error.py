@@ -17,7 +17,7 @@ from vnca.painting.roll import Painting, Roll, RollState
 Vnca = Callable[..., Any]
 Paint = Callable[..., Any]
 QUICK = ("--warmup", 4, "--steps-per-frame", 2)
-FILM = ("--film.rows", 32, "--film.columns", 32)
+FILM = ("--rows", 32, "--columns", 32)
 
 
 @pytest.fixture

@@ -105,7 +105,7 @@ def test_a_finer_painting_goes_on_to_the_same_files(painted: Painted, during: Du
     assert painted.run("--refine", 2).code == 0
     whole = painted.files
     during(3, control_c)
-    assert painted.run("--refine", 2).code == 130
+    assert painted.run("--refine", 2, "--overwrite").code == 130
     outcome = painted.run("--refine", 2, "--resume")
     assert "going on after 2 frames" in outcome.err
     assert painted.files == whole
@@ -115,7 +115,7 @@ def test_a_finer_painting_goes_on_to_the_same_files(painted: Painted, during: Du
 def test_a_film_is_the_same_whether_or_not_the_painting_was_interrupted(
     painted: Painted, during: During, tmp_path: Path, name: str
 ) -> None:
-    size = ("--film.rows", 32, "--film.columns", 32, "--film.turn", 90)
+    size = ("--rows", 32, "--columns", 32, "--turn", 90)
     film, whole = tmp_path / "film" / name, tmp_path / "whole" / name
     during(3, control_c)
     assert painted.run("--preview", film, *size).code == 130
@@ -123,7 +123,7 @@ def test_a_film_is_the_same_whether_or_not_the_painting_was_interrupted(
     leftover = film.with_name(f".film.unfinished-abcd1234{film.suffix}")
     leftover.write_bytes(b"of a film that was killed")
     assert painted.run("--preview", film, *size, "--resume").code == 0
-    assert painted.run("--preview", whole, *size).code == 0
+    assert painted.run("--preview", whole, *size, "--overwrite").code == 0
     assert film.read_bytes() == whole.read_bytes()
     assert [path.name for path in film.parent.iterdir()] == [name]
 
@@ -133,7 +133,7 @@ def test_a_film_can_be_asked_for_when_all_frames_are_painted(
 ) -> None:
     """SIGTERM came in the last frame, so only the film is missing."""
     film = tmp_path / "film.gif"
-    options = ("--preview", film, "--film.rows", 32, "--film.columns", 32)
+    options = ("--preview", film, "--rows", 32, "--columns", 32)
     during(3, lambda: os.kill(os.getpid(), signal.SIGTERM))
     assert painted.run(*options).code == 143
     assert not film.exists()
@@ -225,7 +225,7 @@ def test_a_painting_does_not_go_on_with_something_else(
 def test_what_does_not_touch_the_files_may_be_another(
     unfinished: Painted, unharmed: dict[str, bytes], tmp_path: Path
 ) -> None:
-    film = ("--preview", tmp_path / "film.gif", "--film.rows", 32, "--film.columns", 32)
+    film = ("--preview", tmp_path / "film.gif", "--rows", 32, "--columns", 32)
     assert unfinished.run("--resume", *film, "--on-error", "hold").code == 0
     assert unfinished.files == unharmed
 
@@ -238,36 +238,68 @@ def test_the_steps_of_the_rule_may_be_asked_for_or_not(painted: Painted, during:
     assert painted.vnca(*command, "--steps-per-frame", steps, "--resume").code == 0
 
 
-def test_without_resume_a_painting_starts_anew(
+def test_frames_that_are_there_are_replaced_only_if_asked_for(
     unfinished: Painted, during: During, unharmed: dict[str, bytes]
 ) -> None:
     before = unfinished.files
+    assert "interrupted; go on with --resume, or choose" in unfinished.run().complaint
     during(1, control_c)
-    outcome = unfinished.run()
-    assert "starting anew; --resume goes on with the painting there" in outcome.err
+    assert unfinished.run("--overwrite").code == 130
     assert unfinished.files == before  # Still time to think again.
-    assert unfinished.run().code == 0
+    assert unfinished.run("--overwrite").code == 0
     assert unfinished.files == unharmed
+    complaint = unfinished.run("--seed", 1).complaint
+    assert "holds painted frames already, such as ball_0001.vdb; choose another --out" in complaint
+    assert unfinished.files == unharmed
+    assert unfinished.run("--seed", 1, "--overwrite").code == 0
+    assert unfinished.files != unharmed
 
 
-def test_a_painting_that_is_overwritten_cannot_be_gone_on_with(
+def test_where_a_painting_is_overwritten_the_new_one_is_what_goes_on(
     unfinished: Painted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A frame of another is in its place: the state must be gone before that is."""
-    monkeypatch.setattr(Unfinished, "save", lambda *_: control_c())
-    assert unfinished.run("--seed", 1).code == 130
-    assert "ball_0001.vdb" in unfinished.files
-    assert STATE not in unfinished.files
+    """A frame of another is in its place: the state must be that one's before the frame is."""
+    save = Unfinished.save
+
+    def only_first(self: Unfinished, path: Path) -> None:
+        if self.sources:
+            control_c()
+        save(self, path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Unfinished, "save", only_first)
+        assert unfinished.run("--seed", 1, "--overwrite").code == 130
+    assert "--seed is another" in unfinished.run("--resume").complaint
+    assert "going on after 0 frames" in unfinished.run("--seed", 1, "--resume").err
 
 
-def test_with_nothing_to_go_on_from_a_painting_starts_with_its_first_frame(
-    painted: Painted, unharmed: dict[str, bytes]
+def test_a_script_may_always_ask_to_go_on(
+    painted: Painted, unharmed: dict[str, bytes], during: During, tmp_path: Path
 ) -> None:
-    for _ in range(2):
-        outcome = painted.run("--resume")
-        assert outcome.code == 0
-        assert "nothing unfinished there; starting with the first frame" in outcome.err
-        assert painted.files == unharmed
+    outcome = painted.run("--resume")
+    assert outcome.code == 0
+    assert "nothing unfinished there; starting with the first frame" in outcome.err
+    during(1, lambda: pytest.fail("painted again"))
+    film = tmp_path / "film.gif"
+    outcome = painted.run("--resume", "--preview", film, "--rows", 32, "--columns", 32)
+    assert outcome.code == 0
+    assert "all 3 frames are painted already" in outcome.err
+    assert film.exists()
+    assert painted.files == unharmed
+
+
+@pytest.mark.parametrize("change", [touched, other_model, without_a_painted_frame])
+def test_frames_of_another_painting_are_not_taken_for_its_own(
+    painted: Painted, change: Callable[[Painted], None]
+) -> None:
+    assert painted.run().code == 0
+    change(painted)
+    if change is touched:
+        os.utime(painted.smoke / "ball_0002.vdb")
+    before = painted.files
+    assert "and none to go on from; choose" in painted.run("--resume").complaint
+    assert painted.files == before
+    assert painted.run("--resume", "--overwrite").code == 0
 
 
 def test_parts_of_a_sequence_share_a_folder(
@@ -337,7 +369,7 @@ def test_keeping_the_state_takes_little_time(
     monkeypatch.setattr("vnca.painting.painter.time.monotonic", lambda: now)
     during(1, painting)
     assert painted.run().code == 0
-    assert saved == ([1, 3] if seconds == 1 else [1, 2, 3])
+    assert saved == ([0, 1, 3] if seconds == 1 else [0, 1, 2, 3])
 
 
 def test_a_painting_does_not_go_on_where_its_cells_lie_elsewhere(

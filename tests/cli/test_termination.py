@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from vnca.cli.termination import finishing, terminable
+from vnca.cli.terminal import finishing, terminable
 from vnca.core.errors import Terminated
 
 Vnca = Callable[..., Any]

@@ -60,7 +60,7 @@ def test_a_run_leaves_a_model_that_bakes(
     assert not model.rule.config.density_prior
     assert model.style is not None
     config = json.loads((run / "config.json").read_text())["config"]
-    assert config["slices"]["size"] == 32
+    assert config["slice"]["size"] == 32
     assert (run / "preview_000002.png").exists()
     outcome = vnca("texture", "bake", run, mesh, "--out", tmp_path / "a.glb", *SMALL, "--size", 64)
     assert outcome.code == 0, outcome.err
@@ -166,7 +166,8 @@ def test_films_of_baked_and_of_living_textures(
 ) -> None:
     baked = tmp_path / "baked.glb"
     assert vnca("texture", "bake", texture, mesh, "--out", baked, "--size", 64, *SMALL).code == 0
-    film = ("--frames", 3, "--rows", 32, "--columns", 32)
+    size = ("--rows", 32, "--columns", 32)
+    film = ("--frames", 3, *size)
     out = tmp_path / "turn.gif"
     outcome = vnca("texture", "turntable", baked, "--out", out, *film)
     assert outcome.code == 0, outcome.err
@@ -176,7 +177,7 @@ def test_films_of_baked_and_of_living_textures(
     outcome = vnca("texture", "turntable", mesh, *living)
     assert outcome.code == 0, outcome.err
     still = ("--model", texture, "--steps-per-frame", 0, "--out", tmp_path / "still.png")
-    outcome = vnca("texture", "turntable", mesh, *still, *film, *SMALL)
+    outcome = vnca("texture", "turntable", mesh, *still, *size, *SMALL)
     assert outcome.code == 0, outcome.err
     with Image.open(tmp_path / "still.png") as image:
         assert image.size == (32, 32)
@@ -232,6 +233,8 @@ def test_other_mistakes_end_in_one_line_too(
         ((), "expected one of train, bake"),
         (("volume", texture, "--out", "block.raw"), "block.raw"),
         (("turntable", mesh, "--out", "film.txt"), "film.txt"),
+        (("turntable", mesh, "--out", "one.png", "--frames", 3), "--frames: a picture has none"),
+        (("turntable", mesh, "--out", "film.gif", "--block", 64), "--block: shapes the texture of"),
         (("turntable", tmp_path / "no.glb", "--out", "film.gif"), "no such file"),
         (("bake", texture, tmp_path / "empty.obj", "--out", "a.glb"), "no triangles"),
         (("bake", tmp_path, mesh, "--out", "a.glb"), "no model.safetensors"),

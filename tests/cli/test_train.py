@@ -16,7 +16,8 @@ from PIL import Image
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.loop import Progress, Trainer
-from vnca.training.smoke_config import PRESETS, SmokeConfig
+from vnca.training.presets import preset
+from vnca.training.smoke_config import SmokeConfig
 
 Vnca = Callable[..., Any]
 Run = Callable[..., Path]
@@ -116,14 +117,14 @@ def test_what_is_given_wins_over_the_preset_wherever_it_stands(
     asked: list[Any] = []
     monkeypatch.setattr("vnca.recipe.smoke.run", lambda options, _: asked.append(options))
     given = ["--hidden", 24, "--view.step", 0.5]
-    preset = {
+    chosen = {
         "joined": ["--preset=paper"],
         "twice": ["--preset", "standard", "--preset", "paper"],
     }.get(place, ["--preset", "paper"])
-    options = [*preset, *given] if place == "after" else [*given, *preset]
+    options = [*chosen, *given] if place == "after" else [*given, *chosen]
     assert vnca("train", frame, style, "--out", tmp_path / "run", *options).code == 0
     (options_read,) = asked
-    config, paper = options_read.config, PRESETS["paper"]
+    config, paper = options_read.config, preset(SmokeConfig, "paper")
     assert (config.rule.hidden, config.view.step) == (24, 0.5)
     assert options_read.preset == "paper"
     assert config.iterations == paper.iterations
@@ -141,7 +142,24 @@ def test_the_preset_is_written_down(trained: Run) -> None:
     assert config["preset"] == "paper"
     assert config["config"]["view"]["mode"] == "paper"
     assert config["config"]["view"]["elevation"] == 7
-    assert config["config"]["pool"]["size"] == PRESETS["paper"].pool.size
+    assert config["config"]["pool"]["size"] == preset(SmokeConfig, "paper").pool.size
+
+
+def test_a_preset_of_ones_own_is_a_file_to_copy_and_change(
+    vnca: Vnca, trained: Run, tmp_path: Path
+) -> None:
+    shown = vnca("train", "--show-preset", "-p", "standard", "--view.size", 48)
+    assert (shown.code, shown.err) == (0, "")
+    assert "# Rows and columns of a view, pixels.\nsize = 48" in shown.out
+    mine = tmp_path / "mine.toml"
+    mine.write_text(shown.out.replace('grey_source = "luma"', 'grey_source = "density"'))
+    complaint = vnca("train", "a.vdb", "b.png", "--out", tmp_path / "run", "-p", mine).complaint
+    assert f"{mine}: appearance.grey_source density" in complaint
+    mine.write_text(shown.out.replace("milestones = [0.6, 0.85]", "milestones = [0.5]"))
+    config = resolved(trained("run", "--preset", mine))
+    assert config["config"]["milestones"] == [0.5]
+    assert config["config"]["motion"]["weight"] == 0.3  # as in standard
+    assert config["preset"] == "mine.toml"
 
 
 def test_views_can_be_chosen(trained: Run) -> None:

@@ -336,7 +336,7 @@ def test_a_texture_that_is_trained_already_is_what_training_begins_with(
     both, given = tmp_path / "both", tmp_path / "given"
     options = ("train", frame, style, *tiny[: tiny.index("--texture")])
     assert vnca(*options, "--out", both, "--texture", 1).code == 0
-    assert vnca(*options, "--out", given, "--begin-with", both / "texture").code == 0
+    assert vnca(*options, "--out", given, "--init", both / "texture").code == 0
     assert not (given / "texture").exists()
     assert (given / MODEL_NAME).read_bytes() == (both / MODEL_NAME).read_bytes()
 
@@ -347,9 +347,9 @@ def test_a_texture_that_cannot_be_begun_with_is_refused(
     run = tmp_path / "run"
     options = ("train", frame, style, *tiny[: tiny.index("--texture")])
     assert vnca(*options, "--out", run, "--texture", 0).code == 0
-    other = (*options, "--out", tmp_path / "other", "--begin-with", run)
+    other = (*options, "--out", tmp_path / "other", "--init", run)
     complaint = vnca(*other, "--hidden", 9).complaint
-    assert f"--begin-with {run}" in complaint
+    assert f"--init {run}" in complaint
     assert "in place of 9" in complaint
     assert "one of them" in vnca(*other, "--texture", 1).complaint
     assert not (tmp_path / "other").exists()

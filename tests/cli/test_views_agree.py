@@ -17,8 +17,8 @@ from vnca.io.vdb import Grid, Transform, write_vdb
 
 Vnca = Callable[..., Any]
 CAMERA = (
-    *("--film.rows", 32, "--film.columns", 32, "--film.field-of-view", 0),
-    *("--film.elevation", 0, "--film.background", "#000000"),
+    *("--rows", 32, "--columns", 32, "--field-of-view", 0),
+    *("--elevation", 0, "--background", "#000000"),
 )
 SPACING, THICKNESS, DENSITY = 0.25, 4, 0.2
 GAMMA = 0.7 / 0.9
@@ -135,7 +135,7 @@ def picture(vnca: Vnca, source: Path, *options: object) -> AnyArray:
 
 
 UPRIGHT = np.diag([0.1, 0.1, 0.1, 1.0])
-ANGLES = ("--film.azimuth", 25, "--film.elevation", 15)
+ANGLES = ("--azimuth", 25, "--elevation", 15)
 
 
 def axes(*columns: Sequence[float], at: Sequence[float] = (0, 0, 0)) -> AnyArray:

@@ -87,7 +87,7 @@ def test_a_full_disk_for_the_film_leaves_none_until_there_is_room(
     name: str,
 ) -> None:
     out, film = tmp_path / "out", disk / name
-    options = ("--out", out, "--preview", film, "--film.rows", 96, "--film.columns", 96)
+    options = ("--out", out, "--preview", film, "--rows", 96, "--columns", 96)
     filler = fill(4096)
     code, complaint = stylize(*options)
     assert code == 2

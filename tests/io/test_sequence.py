@@ -156,9 +156,69 @@ def test_fractions_of_any_length_are_sub_frames(tmp_path: Path, names: tuple[str
     assert [path.name for path in find_frames(tmp_path, "10").sub_frames] == list(names)
 
 
+ONLY = ("s.10.25.vdb", "s.10.5.vdb", "s.10.75.vdb")
+
+
 @pytest.mark.parametrize(
     "names",
     [
+        ONLY,
+        (*ONLY, "s.11.25.vdb", "s.11.5.vdb", "s.11.75.vdb"),
+        (*ONLY, "s.11.5.vdb"),
+        ("s.10.5.vdb", "s.11.5.vdb", "s.12.5.vdb"),
+        ("s.0010.5.vdb", "s.0011.5.vdb"),
+        ("s.-10.5.vdb", "s.-9.5.vdb"),
+        ("s.10.0.vdb", "s.10.5.vdb", "s.11.0.vdb"),
+        ("s.10.00.vdb", "s.10.25.vdb", "s.10.50.vdb", "s.10.75.vdb"),
+        ("s.10.000.vdb", "s.10.250.vdb", "s.10.500.vdb", "s.10.750.vdb"),
+        ("s.10.333333.vdb", "s.10.666667.vdb", "s.11.333333.vdb", "s.11.666667.vdb"),
+        tuple(f"s.10.{step}.vdb" for step in ("125", "25", "375", "5", "625", "75", "875")),
+    ],
+    ids=len,
+)
+def test_sub_frames_without_whole_ones_are_no_frames_either(
+    tmp_path: Path, names: tuple[str, ...]
+) -> None:
+    make(tmp_path, *names)
+    more = f" and {len(names) - 1} more"
+    for pattern in ("", "s.*.vdb"):
+        for frames in (None, "5-25"):
+            with pytest.raises(SequenceError) as caught:
+                find_frames(tmp_path / pattern, frames)
+            assert str(caught.value) == (
+                f"{tmp_path / pattern}: {sorted(names)[0]}{more} are sub-frames, and only whole "
+                "frames can be used; there are none"
+            )
+    shot = names[0].rpartition(".vdb")[0].rpartition(".")[0]
+    with pytest.raises(SequenceError, match="are sub-frames"):
+        find_frames(tmp_path / f"{shot}.%d.vdb")
+    assert frames_beside(tmp_path / names[0]) == []
+
+
+def test_sub_frames_of_a_frame_that_is_missing_are_left_out_too(tmp_path: Path) -> None:
+    make(tmp_path, "s.10.vdb", "s.10.25.vdb", "s.11.25.vdb", "s.12.vdb")
+    sequence = find_frames(tmp_path, "10-12")
+    assert [frame.number for frame in sequence] == [10, 12]
+    assert [path.name for path in sequence.sub_frames] == ["s.10.25.vdb", "s.11.25.vdb"]
+
+
+def test_shots_that_could_be_sub_frames_are_told_as_both(tmp_path: Path) -> None:
+    tenths = [f"s.{frame}.{tenth}.vdb" for frame in (10, 11) for tenth in range(1, 10)]
+    make(tmp_path, *tenths)
+    line = r"one of s\.10\.%d\.vdb, s\.11\.%d\.vdb; if these are sub-frames, they cannot be used$"
+    with pytest.raises(SequenceError, match=line):
+        find_frames(tmp_path)
+    assert numbers(tmp_path / "s.10.%d.vdb") == [*range(1, 10)]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("s.10.5.vdb",),
+        ("s.10.1.vdb", "s.10.3.vdb", "s.10.5.vdb"),
+        ("s.10.5.vdb", "s.10.10.vdb", "s.10.15.vdb"),
+        ("s.10.0025.vdb", "s.10.0050.vdb", "s.10.0075.vdb"),
+        ("s.v02.25.vdb", "s.v02.50.vdb", "s.v02.75.vdb", "s.v02.100.vdb"),
         ("shot.10.0001.vdb", "shot.10.0002.vdb"),
         ("s.v02.0010.vdb", "s.v02.0011.vdb"),
         ("s.10.5.vdb", "s.10.6.vdb"),

@@ -311,6 +311,39 @@ def test_what_is_wrong_with_a_file_is_said_in_one_line(
         assert str(caught.value).startswith(str(path))
 
 
+FLAT = Transform.from_matrix(
+    np.block(
+        [
+            [np.diag([0.5, 1e-29, 0.5]), np.array([[1], [2], [3]])],
+            [np.zeros((1, 3)), np.ones((1, 1))],
+        ]
+    )
+)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("factor", "transform", "options", "grid_class"),
+    [
+        (1e20, FLAT, {}, "fog volume"),  # On voxels of its own, each of very many of the density's.
+        (3e20, TRANSFORM, {"velocity_units": "m/s", "fps": 0.1}, "fog volume"),
+        (1e20, TRANSFORM, {"velocity_scale": 1e30}, "fog volume"),
+        (1e38, TRANSFORM, {}, "staggered"),
+    ],
+)
+def test_a_velocity_beyond_all_numbers_is_refused(
+    tmp_path: Path, factor: float, transform: Transform, options: dict[str, Any], grid_class: str
+) -> None:
+    path = saved(
+        tmp_path / "s.vdb",
+        grid("density", density(), transform=transform),
+        grid("velocity", np.full((*SHAPE, 3), 3 * factor, np.float32), grid_class=grid_class),
+    )
+    with pytest.raises(GridError, match=r"s\.vdb: velocity of more than 1e\+20 cells per frame"):
+        read_smoke(path, SmokeFormat(**options))
+    read_smoke(path, SmokeFormat(velocity_grid="none"))
+
+
 def test_metadata_that_lies_about_the_extent_is_refused(tmp_path: Path) -> None:
     path = saved(tmp_path / "s.vdb", grid("density", density()))
     data = path.read_bytes()

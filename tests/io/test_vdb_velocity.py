@@ -1,5 +1,6 @@
 """Velocity on other cells than the density's: what is linear in the world stays so."""
 
+import struct
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from vnca.io.painted import write_painted
 from vnca.io.smoke import EXTRAPOLATED_CELLS, read_smoke, write_smoke
 from vnca.io.smoke_format import UNITS_METADATA, SmokeFormat
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
+from vnca.io.vdb.layout import encode_string
 from vnca.io.vdb_velocity import listed_vectors, velocity_headers
 
 METRES = SmokeFormat(velocity_units="m/s", fps=10)
@@ -360,6 +362,63 @@ def test_a_component_that_is_missing_is_named(
 ) -> None:
     with pytest.raises(GridError, match=words):
         found(named(tmp_path, *names))
+
+
+class Frustum(Transform):
+    """A map of OpenVDB's that is not linear, as a file has it."""
+
+    def encode(self) -> bytes:
+        behind = struct.pack("<8d", 0, 0, 0, 1, 1, 1, 0.5, 1) + super().encode()
+        return encode_string(b"NonlinearFrustumMap") + behind
+
+
+@pytest.mark.parametrize("names", [("vel!",), ("Velocity!",), ("vel.x", "vel.y", "vel.z")])
+def test_a_velocity_in_a_frustum_is_refused_by_its_name(
+    tmp_path: Path, names: tuple[str, ...]
+) -> None:
+    path = named(tmp_path, *names, "wind!")
+    with open_vdb(path) as file:
+        grids = [header.read() for header in file.grids.values()]
+    for grid in grids[1:-1]:
+        grid.transform = Frustum(grid.transform.map_type, grid.transform.numbers)
+    write_vdb(path, grids)
+    first = names[0].removesuffix("!")
+    line = (
+        rf"s\.vdb: velocity grid '{first}' has a NonlinearFrustumMap, .*; choose another with "
+        "`velocity_grid`, or leave it out with `velocity_grid` none$"
+    )
+    for asked in (None, first):
+        with pytest.raises(GridError, match=line):
+            found(path, asked)
+        with pytest.raises(GridError, match=line):
+            read_smoke(path, SmokeFormat(velocity_grid=asked))
+    for chosen, has_velocity in (("wind", True), ("none", False)):
+        smoke = read_smoke(path, SmokeFormat(velocity_grid=chosen))
+        assert (smoke.velocity is not None) is has_velocity
+
+
+@pytest.mark.parametrize("name", ["vel", "V", "velocity"])
+def test_a_velocity_of_an_unknown_type_is_refused_by_its_name(tmp_path: Path, name: str) -> None:
+    path = named(tmp_path, f"{name}!", "wind!")
+    data = path.read_bytes()
+    at = data.index(b"Tree_vec3s")
+    path.write_bytes(data[:at] + data[at:].replace(b"Tree_vec3s", b"Tree_vec3h", 1))
+    line = (
+        rf"s\.vdb: grid '{name}' is of type vec3h, which cannot be read as velocity; "
+        "choose another with `velocity_grid`, or leave it out with `velocity_grid` none$"
+    )
+    for asked in (None, name):
+        with pytest.raises(GridError, match=line):
+            read_smoke(path, SmokeFormat(velocity_grid=asked))
+    assert found(path, "wind") == ["wind"]
+    assert read_smoke(path, SmokeFormat(velocity_grid="none")).velocity is None
+
+
+def test_a_velocity_of_a_known_type_is_found_beside_one_of_an_unknown(tmp_path: Path) -> None:
+    path = named(tmp_path, "velocity!", "vel!")
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"Tree_vec3s", b"Tree_vec3h", 1))
+    assert found(path) == ["vel"]
 
 
 def test_other_grids_are_no_velocity_but_are_listed(tmp_path: Path) -> None:

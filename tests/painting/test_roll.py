@@ -20,7 +20,10 @@ from vnca.engine.session import Compute, Job, Session, StepSession
 from vnca.painting import roll as roll_module
 from vnca.painting.ahead import read_ahead
 from vnca.painting.config import StylizeConfig
+from vnca.painting.parts import SAMPLES
 from vnca.painting.roll import Painting, Roll, stylize
+from vnca.rule.decoder import Decoder
+from vnca.rule.paint import Between, colours, density_factors
 from vnca.rule.rule import Rule, RuleConfig, Scales
 
 RULE = Rule.initial(RuleConfig(channels=4, hidden=3), Scales(), seed=0)
@@ -253,3 +256,36 @@ def test_cells_live_where_they_did_in_training_unless_asked_otherwise() -> None:
     ):
         roll = Roll(rule, StylizeConfig(domain=asked), BOX)  # type: ignore[arg-type]
         assert roll.domain_kind == kind
+
+
+def decoded(*, seed: int = 3) -> Rule:
+    return dataclasses.replace(RULE, decoder=Decoder.initial(4, seed=seed, units=8))
+
+
+@pytest.mark.parametrize("refine", [1, 2, 3, 8])
+def test_a_decoder_paints_the_means_of_the_parts_of_cells(refine: int) -> None:
+    rule, smoke = decoded(), ball(0)
+    with computed_by(plain_step):
+        (painting,) = stylize([smoke], rule, StylizeConfig(warmup=1), box=BOX, refine=refine)
+    assert painting.smoke.box == smoke.box.refined(refine)
+    assert painting.coarse is not None
+    assert painting.coarse.box == smoke.box
+    assert len(painting.state.cells) < 500, "the automaton's cells are those of the smoke"
+    domain = Domain(painting.state.cells, BOX.grown(1))
+    cell, part = np.array([1, -2, 0]), np.array([refine - 1, 0, refine // 2])
+    samples = SAMPLES[refine]
+    offsets = (np.indices((samples,) * 3).reshape(3, -1).T + 0.5) / samples
+    points = cell + (part + offsets) / refine - 0.5
+    seen = Between(rule).at(painting.state.values, *domain.corners(points))
+    at = tuple(cell * refine + part - painting.smoke.origin)
+    np.testing.assert_allclose(painting.colour[at], colours(seen).mean(0), atol=1e-5)
+    expected = painting.smoke.density[at] * density_factors(seen).mean()
+    np.testing.assert_allclose(painting.density[at], expected, rtol=1e-5)
+
+
+def test_strengths_act_on_what_a_decoder_paints() -> None:
+    config = StylizeConfig(warmup=1, strength=0.0, density_strength=0.0)
+    with computed_by(plain_step):
+        (painting,) = stylize([ball(0)], decoded(), config, box=BOX, refine=2)
+    assert (painting.colour == 1).all()
+    np.testing.assert_array_equal(painting.density, painting.smoke.density)

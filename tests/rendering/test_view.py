@@ -7,6 +7,7 @@ import torch
 
 from vnca.core.camera import Orthographic, Perspective, frame_box
 from vnca.core.errors import OptionError, ShapeError
+from vnca.rendering.sample import sample
 from vnca.rendering.view import render
 
 ABOVE = (0, 90)
@@ -322,3 +323,89 @@ def test_colour_of_other_cells_is_refused() -> None:
     density = ball()
     with pytest.raises(ShapeError, match="volume to render"):
         render(density, white(density)[1:], camera_on((12,) * 3), rows=4, columns=4, gamma=1.0)
+
+
+def field_shader(factor: torch.Tensor, colour: torch.Tensor):
+    """What arrays of factors and colours show between cells, and the points that were asked for."""
+    asked: list[torch.Tensor] = []
+
+    def shade(points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        asked.append(points)
+        seen = sample(torch.cat([factor[..., None], colour], -1), points)
+        return seen[:, 0], seen[:, 1:]
+
+    return shade, asked
+
+
+def test_a_shader_that_shows_one_colour_shows_what_an_array_of_it_does() -> None:
+    density = ball(dtype=torch.float64)
+    camera = camera_on(density.shape, 20, 10)
+    options = {"rows": 24, "columns": 24, "gamma": 0.7, "step": 0.5, "offset": 0.3}
+    wide = density.new_full((14, 14, 14), 1.5)
+    ochre = density.new_tensor([0.6, 0.4, 0.1])
+    shade, _ = field_shader(wide[1:-1, 1:-1, 1:-1], ochre.expand(*density.shape, 3))
+    seen = render(density, shade, camera, **options)  # type: ignore[arg-type]
+    expected = render(1.5 * density, ochre.expand(*density.shape, 3), camera, **options)  # type: ignore[arg-type]
+    for ours, theirs in zip(
+        (seen.colour, seen.opacity), (expected.colour, expected.opacity), strict=True
+    ):
+        torch.testing.assert_close(ours, theirs, atol=5e-4, rtol=0)
+
+
+def test_only_what_can_be_seen_is_shaded() -> None:
+    density = torch.ones(20, 20, 20)
+    camera = camera_on(density.shape)
+    ones = torch.ones(20, 20, 20)
+    counts = []
+    for gamma in (0.01, 5.0):
+        shade, asked = field_shader(ones, white(density))
+        view = render(density, shade, camera, rows=8, columns=8, gamma=gamma)
+        counts.append(sum(map(len, asked)))
+    assert view.opacity[4, 4] > 0.999
+    assert counts[1] < counts[0] / 3
+
+
+def test_gradients_reach_a_shader() -> None:
+    density = ball()
+    factor = torch.ones(12, 12, 12, requires_grad=True)
+    colour = torch.full((12, 12, 12, 3), 0.5, requires_grad=True)
+    shade, _ = field_shader(factor, colour)
+    view = render(density, shade, camera_on(density.shape), rows=8, columns=8, gamma=0.3)
+    (view.colour.sum() + view.opacity.sum()).backward()
+    for tensor in (factor, colour):
+        assert tensor.grad is not None
+        assert tensor.grad.abs().sum() > 0
+
+
+@pytest.mark.parametrize("along", [2, 3])
+def test_a_supersampled_view_is_the_mean_of_a_larger_one(along: int) -> None:
+    """Smoke so fine in depth that it matters little where along the rays samples begin."""
+    density = ball()
+    colour = torch.rand(12, 12, 12, 3, generator=torch.Generator().manual_seed(0))
+    camera = camera_on(density.shape, 30, 20)
+    options = {"gamma": 0.5, "step": 0.05}
+    seen = render(density, colour, camera, rows=6, columns=6, supersampling=along, **options)  # type: ignore[arg-type]
+    large = render(density, colour, camera, rows=6 * along, columns=6 * along, **options)  # type: ignore[arg-type]
+
+    def mean(values: torch.Tensor) -> torch.Tensor:
+        return values.view(6, along, 6, along, *values.shape[2:]).mean((1, 3))
+
+    torch.testing.assert_close(seen.opacity, mean(large.opacity), atol=2e-3, rtol=0)
+    torch.testing.assert_close(seen.colour, mean(large.colour), atol=2e-3, rtol=0)
+    there = torch.isfinite(seen.depth)
+    assert torch.equal(there, seen.opacity > 1e-12)
+    assert ((seen.depth[there] > -8) & (seen.depth[there] < 8)).all()
+
+
+def test_samples_of_a_pixel_begin_at_different_depths() -> None:
+    """A sheet thinner than a step is seen in full nowhere, but in every pixel."""
+    density = torch.zeros(9, 9, 9)
+    density[:, 4] = 1
+    camera = Orthographic((4.0, 4.0, 4.0), 0, 0, height=4)
+    options = {"rows": 8, "columns": 8, "gamma": 0.5, "step": 4.0, "offset": 0.0}
+    once = render(density, white(density), camera, **options)  # type: ignore[arg-type]
+    often = render(density, white(density), camera, supersampling=4, **options)  # type: ignore[arg-type]
+    exact = 1 - math.exp(-0.5)
+    assert abs(float(once.opacity.mean()) - exact) > 0.2
+    assert float(often.opacity.std()) < 1e-4
+    assert float(often.opacity.mean()) == pytest.approx(exact, abs=0.15)

@@ -35,7 +35,8 @@ def test_a_higher_frequency_draws_finer_contours() -> None:
         total = 0
         for seed in range(8):
             decoder = Decoder.initial(12, seed=seed, frequency=frequency)
-            added = Between(replace(rule, decoder=decoder)).at(state, rows, fractions) - plain
+            seen = Between(replace(rule, decoder=decoder)).at(state, rows, fractions)
+            added = (seen - plain)[:, :3]
             slope = np.diff(added.astype(np.float64), axis=0)
             total += int((slope[1:] * slope[:-1] < 0).sum())
         return total

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from vnca.core.colour import srgb_to_linear
-from vnca.core.errors import BackendUnavailableError
 from vnca.core.typing import FloatArray
 from vnca.engine.domain import Border, Domain, subdivided
 from vnca.engine.native import step as native
@@ -119,9 +118,14 @@ def test_points_anywhere_find_the_cells_around_them() -> None:
     assert fractions.dtype == np.float32
 
 
-def test_a_backend_that_cannot_run_is_refused() -> None:
-    with pytest.raises(BackendUnavailableError, match="not on arrays"):
-        Between(rule(), "triton")
+@pytest.mark.parametrize(("backend", "same"), [("triton", "auto"), ("reference", "numpy")])
+def test_where_the_automaton_computes_on_tensors_arrays_are_decoded(
+    backend: str, same: str
+) -> None:
+    cells = domain()
+    at = cells.corners(cells.cells + 0.25)
+    seen, expected = (Between(rule(), one).at(state_of(cells), *at) for one in (backend, same))
+    np.testing.assert_array_equal(seen, expected)
 
 
 def test_nothing_lives_nowhere() -> None:

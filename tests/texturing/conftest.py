@@ -34,8 +34,9 @@ def tiny_config() -> TextureConfig:
         appearance=AppearanceConfig(
             samples=128, layers=("relu1_1", "relu2_1", "relu3_1"), style_scale=1.0
         ),
-        slices=SliceConfig(size=32, count=1),
+        slice=SliceConfig(size=32, count=1, pixels_per_cell=2.0),
         block=16,
+        decoder=8,
         iterations=3,
         learning_rate=1e-3,
         rate_warmup=0,

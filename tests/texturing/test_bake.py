@@ -11,7 +11,7 @@ from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import BaseColour
 from vnca.meshes.atlas import Placement, TexelMap, bake, fill, to_png, unwrapped
 from vnca.meshes.turntable import read_picture
-from vnca.painting.block import sample_block
+from vnca.painting.block import Block, sample_block
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_the_texture_shows_the_solid_everywhere_and_on_both_sides_of_seams(
     """Read as a viewer reads it, bilinearly, also right at the border of a chart."""
     atlas = unwrapped(ball, "auto", size=512)
     place = Placement.of(ball, size=16, scale=1)
-    picture = bake(block, atlas.texels, place)
+    picture = bake(Block(block), atlas.texels, place)
     (surface,), (unwrapping,) = ball.surfaces, atlas.unwrappings
     random = np.random.default_rng(0)
     inside = random.dirichlet((1, 1, 1), len(surface.faces))
@@ -59,7 +59,7 @@ def test_only_texels_without_a_surface_are_filled(block: FloatArray) -> None:
     at = np.random.default_rng(0).uniform(0, 16, (40, 3)).astype(np.float32)
     texel = np.random.default_rng(1).choice(64**2, 40, replace=False).astype(np.int32)
     place = Placement(np.zeros(3), 1.0)
-    picture = bake(block, TexelMap(64, texel, at, 0.0), place)
+    picture = bake(Block(block), TexelMap(64, texel, at, 0.0), place)
     np.testing.assert_array_equal(picture.reshape(-1, 3)[texel], sample_block(block, at))
     others = np.delete(picture.reshape(-1, 3), texel, 0)
     assert (others > 0).any(1).all()

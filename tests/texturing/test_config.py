@@ -6,12 +6,13 @@ from vnca.core.errors import OptionError
 from vnca.losses.appearance import AppearanceConfig
 from vnca.rule.rule import RuleConfig
 from vnca.training.config import PoolConfig
-from vnca.training.texture_config import PRESETS, SliceConfig, TextureConfig
+from vnca.training.presets import preset, preset_names
+from vnca.training.texture_config import SliceConfig, TextureConfig
 
 
 def test_presets_tell_cells_nothing() -> None:
-    for config in PRESETS.values():
-        rule = config.rule
+    for name in preset_names(TextureConfig):
+        rule = preset(TextureConfig, name).rule
         assert not any([rule.position_prior, rule.density_prior, rule.velocity_prior])
 
 

@@ -34,7 +34,8 @@ def trainer(style: FloatArray, tiny_config: TextureConfig, vgg: VGG16) -> Make:
 
 def weights(trainer: Trainer) -> list[FloatArray]:
     rule = trainer.rule()
-    return [rule.hidden, rule.bias, rule.output]
+    assert rule.decoder is not None
+    return [rule.hidden, rule.bias, rule.output, *rule.decoder.weights]
 
 
 def same(a: Trainer, b: Trainer) -> bool:
@@ -57,7 +58,7 @@ def test_any_network_teaches(style: FloatArray, tiny_config: TextureConfig, sour
     before = weights(learning)
     assert all(np.isfinite(step.loss) for step in learning.run())
     assert not np.array_equal(before[2], weights(learning)[2])
-    assert learning.picture_cells == learning.style_scale * config.slices.size
+    assert learning.picture_cells == learning.style_scale * config.slice.cells
 
 
 def test_same_seed_same_weights_and_another_seed_others(trainer: Make) -> None:
@@ -82,7 +83,22 @@ def test_smoke_painted_with_a_texture_keeps_its_density(trainer: Make) -> None:
     rule = training.rule()
     assert not rule.output[DENSITY_CHANGE].any()
     assert rule.output[[0, 1, 2, 4, 5]].any(1).all()
-    assert not training.grow(3)[:, DENSITY_CHANGE].any()
+    state = training.grow(3)
+    assert not state[:, DENSITY_CHANGE].any()
+    assert rule.decoder is not None
+    assert rule.decoder.weights.output[:DENSITY_CHANGE].any()
+    assert not rule.decoder.weights.output[DENSITY_CHANGE].any()
+    assert not rule.decoder.weights.output_bias[DENSITY_CHANGE].any()
+
+
+def test_a_decoder_learns_with_the_rule_and_can_be_left_out(trainer: Make) -> None:
+    training = trainer(iterations=2)
+    before = weights(training)
+    list(training.run())
+    assert not any(map(np.array_equal, before[3:], weights(training)[3:]))
+    plain = trainer(iterations=2, decoder=0)
+    list(plain.run())
+    assert plain.rule().decoder is None
 
 
 def test_cells_that_know_nothing_begin_to_learn_at_once(trainer: Make) -> None:

@@ -18,12 +18,13 @@ from vnca.training.memory import (
     memory_used,
     states_to_keep,
 )
+from vnca.training.presets import preset
 from vnca.training.rollout import fewest_kept
 from vnca.training.scenes.smoke import SmokeScene
-from vnca.training.smoke_config import PRESETS, SmokeConfig, ViewConfig
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 CPU = torch.device("cpu")
-MANY = replace(PRESETS["draft"], longest_rollout=64, view=ViewConfig(size=32))
+MANY = replace(preset(SmokeConfig, "draft"), longest_rollout=64, view=ViewConfig(size=32))
 
 
 @pytest.fixture(scope="module")
@@ -138,6 +139,6 @@ def test_this_program_has_memory_and_there_is_some_left() -> None:
 
 
 def test_the_largest_preset_fits_where_its_pool_does(scene: SmokeScene) -> None:
-    paper: SmokeConfig = PRESETS["paper"]
+    paper = preset(SmokeConfig, "paper")
     needs = memory_needs(scene, paper)
     assert fewest_kept(paper.longest_rollout) * needs.state < needs.pool

@@ -12,8 +12,9 @@ from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceLoss
 from vnca.rendering.colour import linear_to_srgb
 from vnca.rule.rule import Rule
+from vnca.training.presets import preset, preset_names
 from vnca.training.scenes.smoke import SmokeScene
-from vnca.training.smoke_config import PRESETS, SmokeConfig
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import choose_scales, smoke_trainer
 
 GREY = 0.214
@@ -21,16 +22,16 @@ GREY = 0.214
 AROUND = (0.0, 90.0, 180.0, 270.0)
 
 
-def small(preset: SmokeConfig) -> SmokeConfig:
-    """The preset, so small that it takes a second."""
+def small(config: SmokeConfig) -> SmokeConfig:
+    """The training, so small that it takes a second."""
     layers = ("relu1_1", "relu2_1", "relu3_1")
     return replace(
-        preset,
-        rule=replace(preset.rule, channels=6, hidden=16),
-        view=replace(preset.view, size=32),
-        pool=replace(preset.pool, size=4),
-        appearance=replace(preset.appearance, layers=layers, samples=128),
-        motion=replace(preset.motion, weight=0.0),
+        config,
+        rule=replace(config.rule, channels=6, hidden=16),
+        view=replace(config.view, size=32),
+        pool=replace(config.pool, size=4),
+        appearance=replace(config.appearance, layers=layers, samples=128),
+        motion=replace(config.motion, weight=0.0),
         iterations=15,
         learning_rate=3e-3,
         rate_warmup=0,
@@ -39,17 +40,18 @@ def small(preset: SmokeConfig) -> SmokeConfig:
     )
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", preset_names(SmokeConfig))
 def test_a_few_iterations_of_every_preset_beat_even_grey(
     name: str, tiny_smoke: Volume, style: FloatArray, vgg: VGG16
 ) -> None:
-    config = small(PRESETS[name])
+    config = small(preset(SmokeConfig, name))
     trainer = smoke_trainer(tiny_smoke, style, config, vgg)
     list(trainer.run())
     scene, state = trainer.scene, trainer.grow(12)
     assert isinstance(scene, SmokeScene)
     loss = AppearanceLoss(vgg, style, config.appearance, config.view.size)
 
+    @torch.no_grad()
     def distance(picture: Tensor, opacity: Tensor) -> float:
         shown = linear_to_srgb(picture).permute(2, 0, 1)[None]
         return float(loss(shown, opacity[None], torch.Generator().manual_seed(0)).total)
@@ -64,7 +66,7 @@ def test_a_few_iterations_of_every_preset_beat_even_grey(
 
 
 def test_the_papers_preset_shows_smoke_as_bright_as_its_colour(tiny_smoke: Volume) -> None:
-    config = small(PRESETS["paper"])
+    config = small(preset(SmokeConfig, "paper"))
     rule = Rule.initial(config.rule, choose_scales(tiny_smoke, config), seed=0)
     scene = SmokeScene(tiny_smoke, rule, config.view)
     state = scene.seed(6)

@@ -1,12 +1,11 @@
 import math
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from vnca.core.errors import OptionError
 from vnca.training.config import PoolConfig
-from vnca.training.smoke_config import PRESETS, SmokeConfig, ViewConfig
+from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 
 @pytest.mark.parametrize(
@@ -19,6 +18,8 @@ from vnca.training.smoke_config import PRESETS, SmokeConfig, ViewConfig
         (SmokeConfig, "milestones", (100.0, 200.0)),
         (SmokeConfig, "shortest_rollout", 0),
         (SmokeConfig, "overflow", math.nan),
+        (SmokeConfig, "texture", -1.0),
+        (SmokeConfig, "texture", 1001.0),
         (SmokeConfig, "seed", -1),
         (SmokeConfig, "seed", 2**64),
         (ViewConfig, "size", 31),
@@ -43,18 +44,6 @@ def test_values_that_cannot_work_are_refused_by_the_name_of_their_option(
 def test_a_rollout_is_not_shorter_than_its_shortest() -> None:
     with pytest.raises(OptionError, match="`longest_rollout`"):
         SmokeConfig(shortest_rollout=9, longest_rollout=8)
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-def test_every_preset_can_be_changed_and_still_works(preset: str) -> None:
-    assert replace(PRESETS[preset], seed=1) != PRESETS[preset]
-
-
-def test_the_paper_preset_is_the_papers() -> None:
-    paper = PRESETS["paper"]
-    assert paper.view.mode == "paper"
-    assert paper.appearance.pixels == 0
-    assert paper.rule.position_prior
 
 
 def test_the_learning_rate_rises_to_its_height_and_falls_at_each_milestone() -> None:

@@ -23,6 +23,7 @@ from vnca.io.smoke_format import on_one_lattice
 from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import Painter
 from vnca.painting.roll import Roll
+from vnca.painting.still import StillSmoke
 from vnca.rule.rule import Rule, RuleConfig, Scales
 from vnca.simulation import simulate
 
@@ -54,15 +55,29 @@ class PaintedSequence:
 
     @classmethod
     def read(
-        cls, rule: Rule, sequence: FrameSequence, smoke: SmokeFormat, *, steps: int | None
+        cls,
+        rule: Rule,
+        sequence: FrameSequence,
+        smoke: SmokeFormat,
+        *,
+        steps: int | None,
+        tell: Callable[[str], None],
     ) -> "PaintedSequence":
         """The frames of a sequence; all have equally many steps, the first too.
+
+        Args:
+            rule: What will paint it.
+            sequence: The files.
+            smoke: How they are read.
+            steps: Of the automaton in each frame; the rule's own if None.
+            tell: Is given a line if the rule wants a velocity that a frame does not have.
 
         Raises:
             VncaError: If a frame cannot be read.
         """
         frames = (read_smoke(f.path, smoke, frame=f.number) for f in sequence)
-        volumes = list(on_one_lattice(frames))
+        still = StillSmoke(rule, smoke, tell)
+        volumes = list(on_one_lattice(still.watched(frames, [f.path for f in sequence])))
         config = StylizeConfig(steps_per_frame=steps, warmup=0)
         return cls(rule, sequence, smoke, volumes, config)
 
@@ -209,7 +224,7 @@ def _painter(painted: PaintedSequence, roll: Roll, folder: Path) -> Painter:
 
 
 def _paint(painter: Painter) -> None:
-    with closing(painter.paint(painter.begin(resume=False))) as paths:
+    with closing(painter.paint(painter.begin(resume=False, overwrite=True))) as paths:
         for _ in paths:
             pass
     painter.discard()

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 
 import vnca
 from vnca.cli.help import ASKED, JSON_PROGRESS
-from vnca.cli.options import spelled_out
-from vnca.cli.progress import as_options, end_line, event, json_events
-from vnca.cli.subcommands import usage
-from vnca.cli.termination import terminable
+from vnca.cli.options import spelled_out, usage
+from vnca.cli.terminal import as_options, end_line, event, json_events, terminable
 from vnca.core.errors import Terminated, VncaError
 
 COMMANDS = {
+    "paint": "paint a sequence in the style of a picture: train, stylize and film in one go",
     "demo": "simulate, train, stylize and film a small plume, from nothing",
     "simulate": "write a smoke simulation to play with",
     "train": "learn a rule from one frame of smoke and one picture",

@@ -5,20 +5,20 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import tyro
 
 import vnca
-from vnca.cli.options import STDOUT, chosen, parse, print_json, say
-from vnca.cli.watch import Terminal
-from vnca.core.errors import OptionError
+from vnca.cli.options import STDOUT, chosen, parse, print_json
+from vnca.cli.terminal import Terminal, say
+from vnca.core.errors import GridError, OptionError
 from vnca.core.files import existing_file, whole_file, writable_file
 from vnca.core.volume import Volume
 from vnca.features.load import load_network
 from vnca.io.picture import read_image
-from vnca.io.smoke import SmokeFormat
+from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.metrics.motion import (
     Estimator,
     MotionMeasures,
@@ -34,8 +34,9 @@ from vnca.recipe.smoke import run as train
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import Rule
 from vnca.training.checkpoint import CHECKPOINT_NAME
+from vnca.training.presets import DEFAULT, preset
 from vnca.training.run import CONFIG_NAME
-from vnca.training.smoke_config import PRESETS, SmokeConfig
+from vnca.training.smoke_config import SmokeConfig
 
 
 @dataclass(frozen=True)
@@ -55,17 +56,17 @@ class Ablate:
     of another frame, picture or options are refused."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """A run of each kind for each seed."""
-    preset: Literal["draft", "standard", "paper"] = "draft"
-    """Values of all hyperparameters that are not given."""
+    preset: str = DEFAULT
+    """Values of all hyperparameters that are not given: draft, standard, paper, or a TOML file."""
     json: Path | None = None
     """File for the measures of all runs; - prints them instead of the table."""
     size: int = 128
     """Rows and columns of the views that are measured, pixels."""
     device: str = "auto"
     """Where to train: auto, cpu or cuda."""
-    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
-    config: Annotated[SmokeConfig, tyro.conf.arg(name="")] = field(default_factory=SmokeConfig)
+    config: SmokeConfig = field(default_factory=SmokeConfig)
     """Hyperparameters."""
 
     def __post_init__(self) -> None:
@@ -78,8 +79,10 @@ class Ablate:
 def run(arguments: Sequence[str]) -> None:
     """Read the options, train and measure."""
     missing: Any = tyro.MISSING
-    preset = chosen(arguments, "--preset", "draft")
-    defaults = Ablate(missing, missing, missing, config=PRESETS.get(preset, SmokeConfig()))
+    name = chosen(arguments, "--preset", DEFAULT)
+    # A texture is left out, as the paper leaves it out.
+    config = dataclasses.replace(preset(SmokeConfig, name), texture=0.0)
+    defaults = Ablate(missing, missing, missing, config=config)
     ablate(parse("ablate", Ablate, arguments, default=defaults))
 
 
@@ -102,6 +105,8 @@ def ablate(options: Ablate) -> None:
         writable_file(options.json)
     seen_by = estimators()
     smoke = _read(options.frame, options.smoke)
+    if smoke.velocity_field is None:
+        raise GridError(f"{missing_velocity(options.frame)}; without one there is nothing to find")
     rules: list[Rule] = []
     found: dict[str, list[MotionMeasures]] = {}
     for variant, config, folder, is_trained in _runs(options, smoke):
@@ -113,7 +118,6 @@ def ablate(options: Ablate) -> None:
                     style=options.style,
                     out=folder,
                     preset=options.preset,
-                    texture=0,  # as the paper trains
                     overwrite=True,
                     device=options.device,
                     smoke=options.smoke,

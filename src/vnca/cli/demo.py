@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from vnca.cli.options import parse, say
-from vnca.cli.watch import Terminal
+from vnca.cli.options import parse
+from vnca.cli.terminal import Terminal, say
 from vnca.core.typing import FloatArray
 from vnca.core.watch import Watch
 from vnca.io.film import contact_sheet
@@ -19,7 +19,8 @@ from vnca.recipe.simulation import simulate
 from vnca.recipe.smoke import SmokeRun
 from vnca.recipe.smoke import run as train
 from vnca.recipe.stylizing import stylize
-from vnca.training.smoke_config import PRESETS, SmokeConfig
+from vnca.training.presets import DEFAULT, preset
+from vnca.training.smoke_config import SmokeConfig
 
 STYLE = "vangogh_cafe_terrace.webp"
 """A painting in the package, in the public domain."""
@@ -71,7 +72,6 @@ def demonstrate(options: Demo) -> None:
             style=style,
             out=run_folder,
             overwrite=True,
-            texture=1.0 if options.quick else None,
             config=_config(options),
         )
         train(asked, watch)
@@ -82,6 +82,7 @@ def demonstrate(options: Demo) -> None:
             out=painted,
             frames=shown,
             preview=film,
+            overwrite=True,
             refine=1 if options.quick else 2,
             watch=watch,
         )
@@ -96,12 +97,13 @@ def demonstrate(options: Demo) -> None:
 
 
 def _config(options: Demo) -> SmokeConfig:
-    config = replace(PRESETS["draft"], seed=options.seed)
+    config = replace(preset(SmokeConfig, DEFAULT), seed=options.seed)
     if not options.quick:
         return config
     return replace(
         config,
         iterations=60,
+        texture=1.0,
         view=replace(config.view, size=96),
         rule=replace(config.rule, hidden=64),
         longest_rollout=24,

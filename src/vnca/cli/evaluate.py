@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import tyro
 
 from vnca.cli.options import parse, print_json
-from vnca.cli.watch import Terminal
+from vnca.cli.terminal import Terminal
 from vnca.io.smoke import SmokeFormat
 from vnca.painting.config import StylizeConfig
 from vnca.recipe import evaluation
@@ -28,9 +28,9 @@ class Evaluate(evaluation.EvaluateRun):
     """Folder for report.html and report.json; "evaluation" in that of the run unless given."""
     json: bool = False
     """Print the measures as JSON, as in report.json, instead of a table."""
-    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
-    config: Annotated[StylizeConfig, tyro.conf.arg(name="")] = field(default_factory=StylizeConfig)
+    config: StylizeConfig = field(default_factory=StylizeConfig)
     """How the rule is applied."""
 
 

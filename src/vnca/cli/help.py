@@ -1,6 +1,5 @@
 """What `--help` and `--help-all` print: the options of a dataclass, all or those asked for most."""
 
-import ast
 import dataclasses
 import inspect
 import re
@@ -14,6 +13,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import tyro
 
+from vnca.core.records import field_texts
+from vnca.core.shot import Shot
+
 SHORT = {
     "-o": "--out",
     "-p": "--preset",
@@ -26,22 +28,23 @@ SHORT = {
 ASKED = ("-h", "--help", "--help-all")
 """What asks for help."""
 _SMOKE = ("velocity-units", "fps", "up-axis")
-_FILM = ("film.azimuth", "film.elevation", "film.turn", "film.rows", "film.columns", "film.fps")
+_FILM = ("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background")
 COMMON: Mapping[str, tuple[str, ...]] = {
+    "paint": (
+        *("out", "preset", "training-frame", "frames", "refine", "seed", *_SMOKE),
+        *("device", "resume", "overwrite"),
+    ),
     "train": (
         *("out", "preset", "iterations", "view.size", "seed", "texture", *_SMOKE),
         *("device", "memory-budget", "overwrite"),
     ),
     "stylize": (
         *("out", "frames", "refine", "preview", "strength", "density-strength", "gamma", "seed"),
-        *("resume", "on-error", *_SMOKE),
+        *("resume", "overwrite", "on-error", *_SMOKE),
     ),
     "evaluate": ("out", "frames", "refine", "style", "size", "json"),
     "ablate": ("out", "preset", "seeds", "iterations", "json", "device", *_SMOKE),
-    "render": (
-        *("out", "frames", "turntable", "strip", "transparent", "gamma"),
-        *(*_FILM, "film.background"),
-    ),
+    "render": (*("out", "frames", "turntable", "strip", "transparent", "gamma", *_FILM),),
     "texture train": ("out", "preset", "iterations", "seed", "mesh", "device", "overwrite"),
     "bench step": ("backends", "threads", "json", "csv"),
     "bench train": ("preset", "backends", "device", "threads", "repeats", "json", "csv"),
@@ -49,6 +52,11 @@ COMMON: Mapping[str, tuple[str, ...]] = {
 }
 """The options that `--help` shows of a command, in its order; of others it shows all."""
 JSON_PROGRESS = "--json-progress"
+NAMES: dict[str, str] = dict.fromkeys(("config", "rule", "smoke", "grow", "film"), "")
+"""What options of fields are called where it is not as the field; empty for a dataclass whose
+fields are options as if they were of the one around it."""
+SHOT_NAMES = {"fps": "film-fps", "step": "ray-step"}
+"""Likewise of how a film is taken: `--fps` is the simulation's."""
 _COLUMN = 26
 _WIDTHS = (60, 100)
 
@@ -58,7 +66,7 @@ class Option:
     """An option or a positional argument.
 
     Attributes:
-        name: Without dashes: `film.fps`.
+        name: Without dashes: `view.size`.
         group: What it belongs to, a sentence; empty for the command itself.
         form: What follows it: `{1,2,3,4}`; empty for a flag.
         text: What it does.
@@ -171,44 +179,67 @@ def _meant(option: Option, names: Collection[str]) -> str:
 def _options(
     kind: type, default: Any, prefix: str = "", group: str = "", separator: str = " "
 ) -> Iterator[Option]:
-    hints, texts = get_type_hints(kind, include_extras=True), _texts(kind)
+    hints, texts = get_type_hints(kind, include_extras=True), field_texts(kind)
     for field in dataclasses.fields(kind):
         hint: Any = hints[field.name]
         marks: tuple[Any, ...] = ()
         if get_origin(hint) is Annotated:
             hint, *rest = get_args(hint)
             marks = tuple(rest)
-        value = _value(field, default)
-        named = next((n for n in (getattr(m, "name", None) for m in marks) if n is not None), None)
+        value = default_of(field, default)
+        named = option_name(kind, field.name)
         name = prefix + (field.name.replace("_", "-") if named is None else named)
         if dataclasses.is_dataclass(hint) and isinstance(hint, type):
             inside = f"{name}." if named != "" else prefix
             title = (inspect.getdoc(hint) or "").partition("\n\n")[0]
             yield from _options(hint, value, inside, title, separator)
             continue
-        is_missing = value is dataclasses.MISSING or value is tyro.MISSING
+        is_required = _is_missing(value)
         metavar = next((m.metavar for m in marks if getattr(m, "metavar", None)), None)
         yield Option(
             name,
             group,
             "" if hint is bool else metavar or _form(hint, separator),
             " ".join(texts.get(field.name, "").split()),
-            "" if is_missing else _written(value, separator),
+            "" if is_required else _written(value, separator),
             is_positional=any(mark is _POSITIONAL for mark in marks),
-            is_required=is_missing,
+            is_required=is_required,
             is_flag=hint is bool,
         )
 
 
+_MISSING = (dataclasses.MISSING, tyro.MISSING, tyro.MISSING_NONPROP)
 _POSITIONAL: Any = list(get_args(tyro.conf.Positional[int]))[1]
 
 
-def _value(field: "dataclasses.Field[Any]", default: Any) -> Any:
-    if default not in (None, dataclasses.MISSING, tyro.MISSING):
-        return getattr(default, field.name)
+def option_name(kind: type, field: str) -> str | None:
+    """What the option of a field is called where it is not called like the field.
+
+    Empty for a dataclass whose own fields are options as if they were of the one around it.
+    """
+    return (SHOT_NAMES if issubclass(kind, Shot) else NAMES).get(field)
+
+
+def as_option(argument: str) -> str:
+    """The option of an argument as the library names it: `--view.size` of `view.size`."""
+    name = argument.removeprefix("film.")
+    if name != argument:
+        name = SHOT_NAMES.get(name, name)
+    return "--" + name.replace("_", "-")
+
+
+def _is_missing(value: Any) -> bool:
+    """Whether a default says that there is none."""
+    return any(value is one for one in _MISSING)
+
+
+def default_of(field: "dataclasses.Field[Any]", instance: Any) -> Any:
+    """The value of a field that is not given: that of an instance, or else the field's own."""
+    if instance is not None and not _is_missing(instance):
+        return getattr(instance, field.name)
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
-    return field.default
+    return tyro.MISSING if field.default is dataclasses.MISSING else field.default
 
 
 def _form(hint: Any, separator: str) -> str:
@@ -243,25 +274,3 @@ def _written(value: Any, separator: str) -> str:
 
 def _is_grid(value: tuple[Any, ...]) -> bool:
     return len(value) == 3 and all(type(one) is int for one in value)
-
-
-def _texts(kind: type) -> dict[str, str]:
-    """The string under each field of a dataclass, and of those that it is made of, by name."""
-    found: dict[str, str] = {}
-    for one in reversed(kind.__mro__):
-        if not dataclasses.is_dataclass(one):
-            continue
-        try:
-            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(one))).body
-        except (OSError, TypeError):  # installed without its source
-            continue
-        assert isinstance(tree, ast.ClassDef)
-        for field, text in zip(tree.body, tree.body[1:], strict=False):
-            if (
-                isinstance(field, ast.AnnAssign)
-                and isinstance(field.target, ast.Name)
-                and isinstance(text, ast.Expr)
-                and isinstance(text.value, ast.Constant)
-            ):
-                found[field.target.id] = str(text.value.value)
-    return found

@@ -1,24 +1,47 @@
 """From dataclasses to options: the one place that knows how a command line is read."""
 
+import dataclasses
+import importlib
 import io
 import json
 import re
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stderr
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Annotated, Any, TypeVar, cast, get_type_hints
 
 import tyro
+from tyro.constructors import (
+    ConstructorRegistry,
+    StructConstructorSpec,
+    StructFieldSpec,
+    StructTypeInfo,
+)
 
-from vnca.cli.help import ASKED, SHORT, help_text
-from vnca.cli.progress import as_options, end_line
+from vnca.cli.help import ASKED, SHORT, default_of, help_text, option_name
 from vnca.core.errors import OptionError
 
 T = TypeVar("T")
 STDOUT = Path("-")
 """Where `--json -` writes."""
+_RULES = ConstructorRegistry()
+
+
+@_RULES.struct_rule
+def _dataclass(asked: StructTypeInfo) -> StructConstructorSpec | None:
+    """Options of a dataclass, named as `option_name` has it: dataclasses know nothing of them."""
+    if not dataclasses.is_dataclass(asked.type):
+        return None
+    hints = get_type_hints(asked.type, include_extras=True)
+    fields = []
+    for field in dataclasses.fields(asked.type):
+        hint: Any = hints[field.name]
+        if (name := option_name(asked.type, field.name)) is not None:
+            hint = Annotated[hint, tyro.conf.arg(name=name)]
+        default = default_of(field, asked.default)
+        fields.append(StructFieldSpec(field.name, hint, default))
+    return StructConstructorSpec(asked.type, tuple(fields))
 
 
 def parse(
@@ -56,7 +79,7 @@ def parse(
         raise SystemExit(0)
     complaint = io.StringIO()
     try:
-        with redirect_stderr(complaint):
+        with redirect_stderr(complaint), _RULES:
             return tyro.cli(options, prog=f"vnca {command}", args=list(arguments), **keywords)
     except SystemExit:
         what = _in_one_line(complaint.getvalue())
@@ -103,12 +126,6 @@ def is_given(arguments: Sequence[str], option: str) -> bool:
     return any(word.partition("=")[0] == option for word in arguments)
 
 
-def say(line: str) -> None:
-    """Tell the user something that is not the result: on standard error, on a line of its own."""
-    end_line()
-    print(as_options(line), file=sys.stderr, flush=True)
-
-
 def print_json(value: Any) -> None:
     """Print a result as JSON on standard output; numbers that JSON has no word for are null."""
     print(json.dumps(_plain(value), indent=2, allow_nan=False))
@@ -124,3 +141,49 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if isfinite(value) else None
     return str(value)
+
+
+def run_subcommand(
+    command: str,
+    purpose: str,
+    commands: Mapping[str, str],
+    homes: Mapping[str, str],
+    arguments: Sequence[str],
+) -> None:
+    """Run a command of a command.
+
+    Args:
+        command: As it is called without `vnca`.
+        purpose: What it is there for, a sentence.
+        commands: What each of those to choose from does, by name.
+        homes: The function of each, as `module:function` of this package.
+        arguments: The name of one, and what it is to be given.
+
+    Raises:
+        OptionError: If there is none of that name.
+    """
+    name, rest = (arguments[0], arguments[1:]) if arguments else ("", ())
+    if name in ASKED:
+        print(usage(f"vnca {command}", purpose, commands))
+        return
+    if name not in commands:
+        raise OptionError(f"vnca {command}: expected one of {', '.join(commands)}, got '{name}'")
+    module, _, function = homes[name].partition(":")
+    getattr(importlib.import_module(f"vnca.cli.{module}"), function)(rest)
+
+
+def usage(call: str, purpose: str, commands: Mapping[str, str]) -> str:
+    """What `call --help` prints."""
+    width = max(map(len, commands))
+    return "\n".join(
+        [
+            f"usage: {call} COMMAND [OPTIONS]",
+            "",
+            purpose,
+            "",
+            "commands:",
+            *(f"  {name:{width}}  {what}" for name, what in commands.items()),
+            "",
+            f"`{call} COMMAND --help` lists the options of a command.",
+        ]
+    )

@@ -1,14 +1,13 @@
 """`vnca render SEQUENCE --out FILM`."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated
 
 import tyro
 
 from vnca.cli.options import parse
-from vnca.cli.watch import Terminal
-from vnca.io.smoke import SmokeFormat
+from vnca.cli.terminal import Terminal
 from vnca.recipe import rendering
 
 
@@ -18,8 +17,6 @@ class Render(rendering.RenderRun):
 
     sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SEQUENCE")]
     """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
-    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
-    """How smoke is read from files."""
 
 
 def run(arguments: Sequence[str]) -> None:

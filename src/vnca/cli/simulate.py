@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from vnca.cli.options import parse
-from vnca.cli.watch import Terminal
+from vnca.cli.terminal import Terminal
 from vnca.recipe.simulation import Scene, SimulateRun, simulate
 
 

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import tyro
 
 from vnca.cli.options import parse
-from vnca.cli.termination import finishing
-from vnca.cli.watch import Terminal
+from vnca.cli.terminal import Terminal, finishing
 from vnca.io.smoke import SmokeFormat
 from vnca.painting.config import StylizeConfig
 from vnca.recipe import painting
@@ -25,9 +24,9 @@ class Stylize(painting.StylizeRun):
     """A model file, or the folder of a training run."""
     sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SEQUENCE")]
     """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
-    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
-    config: Annotated[StylizeConfig, tyro.conf.arg(name="")] = field(default_factory=StylizeConfig)
+    config: StylizeConfig = field(default_factory=StylizeConfig)
     """How the rule is applied."""
 
 

@@ -1,4 +1,4 @@
-"""`vnca train FRAME STYLE --out RUN`, and `vnca train --resume RUN`."""
+"""`vnca train FRAME STYLE --out RUN`, `vnca texture train STYLE --out RUN`, and going on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -8,10 +8,16 @@ from typing import Annotated, Any
 import tyro
 
 from vnca.cli.options import chosen, is_given, parse
-from vnca.cli.watch import Terminal
+from vnca.cli.terminal import Terminal
+from vnca.core.errors import OptionError
 from vnca.io.smoke import SmokeFormat
-from vnca.recipe import smoke
-from vnca.training.smoke_config import PRESETS, SmokeConfig
+from vnca.recipe import smoke, texture
+from vnca.training.presets import DEFAULT, as_toml, preset, preset_names
+from vnca.training.smoke_config import SmokeConfig
+from vnca.training.texture_config import TextureConfig
+
+SHOW_PRESET = "--show-preset"
+_MISSING: Any = tyro.MISSING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,6 +25,8 @@ class Train(smoke.SmokeRun):
     """Learn a rule from one frame of smoke and one picture.
 
     `vnca train --resume RUN` goes on with a training that was interrupted.
+    `vnca train --show-preset > mine.toml` writes a preset to change, and to train with by `-p
+    mine.toml`.
     """
 
     out: Path
@@ -27,9 +35,11 @@ class Train(smoke.SmokeRun):
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
-    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
+    preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = DEFAULT
+    """Values of all hyperparameters that are not given: draft, standard, paper, or a TOML file."""
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
-    config: Annotated[SmokeConfig, tyro.conf.arg(name="")] = field(default_factory=SmokeConfig)
+    config: SmokeConfig = field(default_factory=SmokeConfig)
     """Hyperparameters."""
 
 
@@ -38,14 +48,81 @@ class Resume(smoke.ResumeSmokeRun):
     """Go on with a training that was interrupted, as if it had not been."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class ShowPreset:
+    """Print a preset, with what is given in its place, as a TOML file to copy and change."""
+
+    show_preset: bool = True
+    """What is asked for."""
+    preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = DEFAULT
+    """The preset."""
+    config: SmokeConfig = field(default_factory=SmokeConfig)
+    """Hyperparameters."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainTexture(texture.TextureRun):
+    """Learn a solid texture from one picture.
+
+    `vnca texture train --resume RUN` goes on with a training that was interrupted.
+    `vnca texture train --show-preset > mine.toml` writes a preset to change, and to train with by
+    `-p mine.toml`.
+    """
+
+    out: Path
+    """Folder of the run: model, configuration, previews and loss curves."""
+    style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
+    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
+    preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = DEFAULT
+    """Values of all hyperparameters that are not given: draft, standard, or a TOML file."""
+    config: TextureConfig = field(default_factory=TextureConfig)
+    """Hyperparameters."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResumeTexture(texture.ResumeTextureRun):
+    """Go on with a training that was interrupted, as if it had not been."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShowTexturePreset(ShowPreset):
+    """Print a preset, with what is given in its place, as a TOML file to copy and change."""
+
+    config: TextureConfig = field(default_factory=TextureConfig)  # type: ignore[assignment]
+    """Hyperparameters."""
+
+
 def run(arguments: Sequence[str]) -> None:
-    """Read the options and train, or go on with a training."""
+    """Read the options and train on smoke, or go on with a training."""
     if is_given(arguments, "--resume"):
         smoke.resume_run(parse(smoke.COMMAND, Resume, arguments), Terminal())
         return
-    preset = chosen(arguments, "--preset", "draft")
-    missing: Any = tyro.MISSING
-    defaults = Train(
-        frame=missing, style=missing, out=missing, config=PRESETS.get(preset, SmokeConfig())
-    )
+    if is_given(arguments, "--init") and is_given(arguments, "--texture"):
+        raise OptionError(smoke.TEXTURE_OR_INIT)
+    name = chosen(arguments, "--preset", DEFAULT)
+    config = preset(SmokeConfig, name)
+    if is_given(arguments, SHOW_PRESET):
+        _show(smoke.COMMAND, arguments, ShowPreset(preset=name, config=config))
+        return
+    defaults = Train(frame=_MISSING, style=_MISSING, out=_MISSING, config=config)
     smoke.run(parse(smoke.COMMAND, Train, arguments, default=defaults), Terminal())
+
+
+def run_texture(arguments: Sequence[str]) -> None:
+    """Read the options and train a solid texture, or go on with a training."""
+    if is_given(arguments, "--resume"):
+        texture.resume_run(parse(texture.COMMAND, ResumeTexture, arguments), Terminal())
+        return
+    name = chosen(arguments, "--preset", DEFAULT)
+    config = preset(TextureConfig, name)
+    if is_given(arguments, SHOW_PRESET):
+        _show(texture.COMMAND, arguments, ShowTexturePreset(preset=name, config=config))
+        return
+    defaults = TrainTexture(style=_MISSING, out=_MISSING, config=config)
+    texture.run(parse(texture.COMMAND, TrainTexture, arguments, default=defaults), Terminal())
+
+
+def _show(command: str, arguments: Sequence[str], defaults: ShowPreset) -> None:
+    shown = parse(command, type(defaults), arguments, default=defaults)
+    base = shown.preset if shown.preset in preset_names(type(shown.config)) else DEFAULT
+    print(as_toml(shown.config, base), end="")

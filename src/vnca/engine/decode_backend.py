@@ -4,7 +4,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-from vnca.core.errors import BackendUnavailableError
 from vnca.core.typing import FloatArray
 from vnca.engine.session import Compute, choose
 
@@ -52,13 +51,10 @@ class ArrayDecode(NamedTuple):
 def array_decode(backend: str = "auto", *, threads: int | None = None) -> ArrayDecode:
     """Decoding of arrays, which takes no torch; arguments and errors are those of `torch_decode`.
 
-    Triton and the reference work on tensors, not on arrays.
+    Triton and the reference decode tensors only: where they compute the automaton, `auto` and numpy
+    decode what was read back.
     """
-    if backend in ("triton", "reference"):
-        raise BackendUnavailableError(
-            f"backend {backend} cannot run: it works on tensors, not on arrays in main memory; "
-            "expected auto, native or numpy"
-        )
+    backend = {"triton": "auto", "reference": "numpy"}.get(backend, backend)
     if choose(Compute(backend)).name == "native":
         from vnca.engine.native import decode as native
 

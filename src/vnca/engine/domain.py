@@ -131,7 +131,7 @@ class Domain:
         """
         lower, upper = np.asarray(self.box.lower), np.asarray(self.box.upper)
         first = np.floor(points)
-        fractions = (points - first).astype(np.float32)
+        fractions = np.ascontiguousarray(points - first, np.float32)
         cells = first + np.array(list(product((0, 1), repeat=3)))[:, None]
         if self.border == "replicate":
             cells = cells.clip(lower, upper - 1)

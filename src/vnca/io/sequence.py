@@ -8,12 +8,14 @@ A dash before the digits is a minus at the start of a name and after `.`, `_`, a
 dash (`smoke.-0001`, `smoke--0001`). After anything else it is a separator, as in `smoke-0001`,
 unless a pattern leaves it to the number (`smoke%04d.vdb`) and finds frame 0 as well.
 
-`smoke.10.25` beside `smoke.10` is a sub-frame, a quarter of a frame after it. Sub-frames are told
-of and left out: a rule is taught its steps for whole frames, and velocity is in cells per frame.
+`smoke.10.25` beside `smoke.10` is a sub-frame, a quarter of a frame after it; so it is without that
+file, beside `smoke.10.5` and `smoke.10.75`. Sub-frames are told of and left out: a rule is taught
+its steps for whole frames, and velocity is in cells per frame.
 """
 
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fnmatch import translate
 from itertools import chain
@@ -229,12 +231,16 @@ def _sequences(files: Iterable[Path]) -> dict[str, _Found]:
         if number is not None and not file.name.startswith(".") and not file.is_dir():
             prefix = _TRAILING.sub("", file.stem)
             groups.setdefault((prefix, file.suffix), []).append(Frame(number, file))
+    shots: dict[tuple[str, str], dict[str, list[Frame]]] = {}
+    for (prefix, suffix), members in groups.items():
+        if (whole := _before_two_numbers(prefix)) is not None:
+            shots.setdefault((whole, suffix), {})[prefix] = members
     sub_frames: dict[tuple[str, str], list[Path]] = {}
-    for (prefix, suffix), members in list(groups.items()):
-        if _are_sub_frames(prefix, members):
+    for (whole, suffix), parts in shots.items():
+        for prefix in _sub_frame_prefixes(parts):
             del groups[prefix, suffix]
-            whole = _TRAILING.sub("", prefix[:-1])
-            sub_frames.setdefault((whole, suffix), []).extend(frame.path for frame in members)
+            paths = [frame.path for frame in parts[prefix]]
+            sub_frames.setdefault((whole, suffix), []).extend(paths)
     found: dict[str, _Found] = {}
     for prefix, suffix in groups | sub_frames:
         frames = groups.get((prefix, suffix), [])
@@ -243,22 +249,61 @@ def _sequences(files: Iterable[Path]) -> dict[str, _Found]:
     return found
 
 
-def _are_sub_frames(prefix: str, members: list[Frame]) -> bool:
-    """Whether numbers after `smoke.10.` are fractions of frame 10, rather than frames of a shot.
+def _before_two_numbers(prefix: str) -> str | None:
+    """`smoke.` of `smoke.10.`, behind which there is a number; None if there is only that one."""
+    match = _TRAILING.search(prefix[:-1]) if prefix.endswith(".") else None
+    return prefix[: match.start()] if match else None
 
-    They are where `smoke.10` is a frame itself, unless they are padded as frames are (`0001`), or
-    run on as no fraction is written (`9`, `10`).
+
+def _sub_frame_prefixes(parts: dict[str, list[Frame]]) -> list[str]:
+    """Which of `smoke.10.`, `smoke.11.` and so on, with the files of each, begin sub-frames."""
+    digits = {
+        prefix: [frame.path.stem[len(prefix) :] for frame in members]
+        for prefix, members in parts.items()
+    }
+    besides = [
+        prefix
+        for prefix, (first, *_) in parts.items()
+        if first.path.with_name(f"{prefix[:-1]}{first.path.suffix}").exists()
+    ]
+    found = [prefix for prefix in besides if _are_fractions(digits[prefix])]
+    if found or _divide_frames(list(digits.values())):
+        found += [prefix for prefix in parts if prefix not in besides]
+    return found
+
+
+def _are_fractions(digits: list[str]) -> bool:
+    """Whether what is written after `smoke.10.` are fractions, where `smoke.10` is a frame itself.
+
+    Else they are frames of a shot: where they are padded as frames are (`0001`), or run on as no
+    fraction is written (`9`, `10`).
     """
-    first = members[0].path
-    whole = first.with_name(f"{prefix[:-1]}{first.suffix}")
-    if not prefix.endswith(".") or _trailing_number(whole) is None or not whole.exists():
-        return False
-    digits = [frame.path.stem[len(prefix) :] for frame in members]
     if not all(map(str.isdigit, digits)):
         return False
     if len(set(map(len, digits))) == 1:
         return not any(number.startswith("0") for number in digits)
     return not any(number.endswith("0") for number in digits)
+
+
+def _divide_frames(shots: list[list[str]]) -> bool:
+    """Whether what is written after `smoke.10.`, `smoke.11.` and so on are fractions.
+
+    Where there is no frame `smoke.10`, they are if together they divide a frame into equal parts
+    (`25`, `5`, `75`), with or without zero; but not if they could as well be frames in a row.
+    """
+    written = set().union(*shots)
+    if not all(map(str.isdigit, written)):
+        return False
+    numbers = sorted(map(int, written))
+    if (len(shots) == 1 or len(numbers) > 1) and numbers == [*range(numbers[0], numbers[-1] + 1)]:
+        return False
+    fractions = sorted((int(digits) / 10 ** len(digits), len(digits)) for digits in written)
+    skipped = int(fractions[0][0] > 0)
+    parts = len(fractions) + skipped
+    return parts > 1 and all(
+        abs(fraction - at / parts) <= 10.0**-places
+        for at, (fraction, places) in enumerate(fractions, skipped)
+    )
 
 
 def _token(prefix: str, members: list[Frame]) -> str:
@@ -273,15 +318,28 @@ def _one_sequence(
     if not sequences:
         raise SequenceError(f"{path}: no numbered .vdb or .npz file{_beside(path)}")
     if len(sequences) > 1:
+        shots = {_before_two_numbers(pattern[: pattern.rindex("%")]) for pattern in sequences}
+        is_doubtful = len(shots) == 1 and None not in shots
+        also = "; if these are sub-frames, they cannot be used" * is_doubtful
         raise SequenceError(
-            f"{path}: several sequences; choose one of {', '.join(sorted(sequences))}"
+            f"{path}: several sequences; choose one of {', '.join(sorted(sequences))}{also}"
         )
     ((pattern, found),) = sequences.items()
     if found.sub_frames and (wanted is None or not found.frames):
-        whole = format_frames(frame.number for frame in found.frames)
-        instead = f"`frames` {whole}" if whole else pattern
-        raise _no_sub_frames(path, found.sub_frames, f"; choose whole frames with {instead}")
+        raise _no_sub_frames(path, found.sub_frames, _whole_frames(path, pattern, found.frames))
     return found
+
+
+def _whole_frames(path: Path, pattern: str, found: list[Frame]) -> str:
+    """How whole frames are chosen, those found or those that the pattern finds."""
+    if found:
+        whole = format_frames(frame.number for frame in found)
+        return f"; choose whole frames with `frames` {whole}"
+    folder = path if path.is_dir() else path.parent
+    with suppress(SequenceError):
+        _matching_number(folder / pattern)
+        return f"; choose whole frames with {pattern}"
+    return "; there are none"
 
 
 def _no_sub_frames(path: Path, files: list[Path], instead: str = "") -> SequenceError:

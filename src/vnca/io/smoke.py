@@ -48,6 +48,8 @@ __all__ = [
 EXTRAPOLATED_CELLS = 4
 # Advection of higher order undershoots a little; what is beyond this is no density.
 NEGATIVE_TOLERANCE = 0.1
+# Cells per frame that leave room in single precision for a lattice of other cells.
+FASTEST = 1e20
 _FITTED_PAIRS = 3
 
 
@@ -78,7 +80,7 @@ def read_smoke(
     path = Path(path)
     stored = _reader(path).read(path, format)
     density = _non_negative(stored.density, path)
-    velocity = None if stored.velocity is None else _velocity(stored.velocity, stored, format)
+    velocity = None if stored.velocity is None else _velocity(stored.velocity, stored, format, path)
     place, index_to_world = _upright(stored.index_to_world, path, format)
     if velocity is not None:
         velocity = place.field(velocity)
@@ -206,14 +208,23 @@ def _to_cells_per_frame(smoke: StoredSmoke, format: SmokeFormat) -> AnyArray:
     return matrix
 
 
-def _velocity(velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat) -> Field:
+def _velocity(
+    velocity: StoredVelocity, smoke: StoredSmoke, format: SmokeFormat, path: Path
+) -> Field:
     """Velocity at the centres of the density's cells, cells/frame, in the file's axes."""
     matrix = _to_cells_per_frame(smoke, format)  # refuses bad options, needed or not
     if velocity.in_cells_per_frame:
         matrix = np.eye(3)
     if velocity.in_cells_per_frame or format.velocity_units != "m/s":
         matrix = velocity.to_density @ matrix
-    found, known = centred(velocity.values, velocity.stored, velocity.staggered)
-    if not np.array_equal(matrix, np.eye(3)):
-        found.values[known.values] = found.values[known.values] @ matrix.T.astype(np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        found, known = centred(velocity.values, velocity.stored, velocity.staggered)
+        if not np.array_equal(matrix, np.eye(3)):
+            found.values[known.values] = found.values[known.values] @ matrix.T.astype(np.float32)
+    if not (np.abs(found.values) <= FASTEST).all():
+        raise GridError(
+            f"{path}: velocity of more than {FASTEST:g} cells per frame, or of none that can be "
+            "computed; check `velocity_units` and the voxels, or leave it out with "
+            "`velocity_grid` none"
+        )
     return extrapolated(found, known, EXTRAPOLATED_CELLS)[0]

@@ -155,12 +155,6 @@ def _read_velocity(
         )
     if not headers:
         return None
-    for header in headers:
-        if header.linear_transform is None:
-            raise GridError(
-                f"{file.path}: velocity grid {header.name!r} has a {header.map_type}, and only "
-                "linear transforms are supported; leave it out with `velocity_grid` none"
-            )
     # A vector grid has one transform for all components, a scalar one its own.
     axes = (None,) if len(headers) == 1 else (0, 1, 2)
     faces = [_is_on_faces(h, axis, format, place) for h, axis in zip(headers, axes, strict=True)]

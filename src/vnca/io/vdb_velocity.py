@@ -27,6 +27,7 @@ from vnca.io.velocity import interpolated
 
 VELOCITY_NAMES = ("velocity", "vel", "v")
 _AXES = ("xyz", "XYZ")
+_WAY_OUT = "choose another with `velocity_grid`, or leave it out with `velocity_grid` none"
 _SEPARATORS = (".", "_")
 _BRICKS_AT_ONCE = 128
 _TOLERANCE = 1e-6
@@ -49,15 +50,27 @@ def listed_vectors(file: VdbFile) -> str:
 
 
 def velocity_headers(file: VdbFile, format: SmokeFormat) -> list[GridHeader]:
-    """One grid of vectors, or three of numbers in the order x, y, z, or none.
+    """One grid of vectors, or three of numbers in the order x, y, z, or none; all can be placed.
 
     A grid of just the name counts first, or three such as NAME.x; then those of the name in any
     case, the axis behind `.`, `_` or nothing. Three are also chosen by the name of the first.
 
     Raises:
-        GridError: If several could be it, a component is missing, or none has the name that was
-            asked for.
+        GridError: If several could be it, a component is missing, one of the name is of a type that
+            cannot be read, or lies where no linear transform puts it, or none has the name that
+            was asked for.
     """
+    headers = _named_velocity(file, format)
+    for header in headers:
+        if header.linear_transform is None:
+            raise GridError(
+                f"{file.path}: velocity grid {header.name!r} has a {header.map_type}, and only "
+                f"linear transforms are supported; {_WAY_OUT}"
+            )
+    return headers
+
+
+def _named_velocity(file: VdbFile, format: SmokeFormat) -> list[GridHeader]:
     asked = format.velocity_grid
     if asked == NO_VELOCITY:
         return []
@@ -82,6 +95,12 @@ def velocity_headers(file: VdbFile, format: SmokeFormat) -> list[GridHeader]:
         return [file.grids[part] for part in found[0]]
     if like:
         return _three(file, like[0])
+    for name, header in file.grids.items():
+        if components(header) is None and name.casefold() in alike:
+            raise GridError(
+                f"{file.path}: grid {name!r} is of type {header.value_type}, which cannot be read "
+                f"as velocity; {_WAY_OUT}"
+            )
     if asked is None:
         return []
     raise GridError(

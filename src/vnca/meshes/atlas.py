@@ -14,7 +14,7 @@ from vnca.io.mesh import Mesh, Surface
 from vnca.io.mesh.texture import Unwrapping
 from vnca.io.picture import to_srgb8
 from vnca.meshes.raster import fragments, weights_at
-from vnca.painting.block import sample_block
+from vnca.painting.block import Block
 
 Unwrap: TypeAlias = Literal["auto", "always", "never"]
 
@@ -40,12 +40,14 @@ class TexelMap:
         texel: `[n]`, row · size + column.
         points: `[n, 3]`, where on the surface they are, +z up.
         overlap: Share of the covered texels that several faces claim.
+        width: That of a texel on the surface, on average, in lengths of the mesh.
     """
 
     size: int
     texel: IntArray
     points: FloatArray
     overlap: float
+    width: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +122,10 @@ def texel_map(
         weights = np.clip(weights, -_FARTHEST, _FARTHEST)
         weights[:, 0] = 1 - weights[:, 1] - weights[:, 2]
         points[start : start + (1 << 20)] = np.einsum("nk,nkc->nc", weights, places[faces])
-    return TexelMap(size, texel, points, float(overlap))
+    first, second = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    area = np.linalg.norm(np.cross(first, second), axis=1).sum() / 2
+    width = float(np.sqrt(area / max(inside, 1)))
+    return TexelMap(size, texel, points, float(overlap), width)
 
 
 def _unusable(surfaces: Sequence[Surface]) -> str | None:
@@ -225,14 +230,15 @@ class Placement:
         return (points - self.corner) * self.cells
 
 
-def bake(block: FloatArray, texels: TexelMap, place: Placement) -> FloatArray:
+def bake(block: Block, texels: TexelMap, place: Placement) -> FloatArray:
     """The texture `[size, size, 3]`, linear RGB; texels without a surface blend in."""
     size = texels.size
+    width = texels.width * place.cells
     picture = np.zeros((size * size, 3), np.float32)
     covered = np.zeros(size * size, np.float32)
     for start in range(0, len(texels.texel), 1 << 20):
         part = slice(start, start + (1 << 20))
-        picture[texels.texel[part]] = sample_block(block, place(texels.points[part]))
+        picture[texels.texel[part]] = block.at(place(texels.points[part]), width)
     covered[texels.texel] = 1
     return fill(picture.reshape(size, size, 3), covered.reshape(size, size))
 

@@ -2,18 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 
 from vnca.core.camera import Orthographic, view_axes
 from vnca.core.errors import OptionError
+from vnca.core.shot import Shot, parse_colour
 from vnca.core.typing import AnyArray, FloatArray
 from vnca.io.mesh import Mesh
 from vnca.io.mesh.texture import BaseColour, base_colours
 from vnca.meshes.atlas import Placement
 from vnca.meshes.raster import visible
-from vnca.painting.block import sample_block
+from vnca.painting.block import Block
 
 SAMPLES = 2
 """Samples along either side of a pixel."""
@@ -28,37 +28,22 @@ Shader = Callable[[AnyArray, AnyArray], AnyArray]
 
 
 @dataclass(frozen=True)
-class TurntableConfig:
+class TurntableConfig(Shot):
     """How a mesh is filmed."""
 
-    rows: int = 384
-    """Height of the film, pixels."""
-    columns: int = 384
-    """Width of the film, pixels."""
-    frames: int = 96
-    """Pictures in the film."""
-    turn: float = 360.0
-    """Degrees the camera goes around the mesh."""
-    azimuth: float = 0.0
-    """Where it begins, degrees; 0 is the front, looking along +y."""
     elevation: float = 15.0
     """How far above the horizon it stands, degrees."""
-    fps: float = 24.0
-    """Frames per second."""
-    background: tuple[float, float, float] = (0.9, 0.9, 0.9)
-    """Linear colour behind the mesh."""
+    turn: float = 360.0
+    """Degrees the camera goes around the mesh."""
+    background: str = "#f4f4f4"
+    """Colour behind the mesh, #rrggbb."""
+    frames: int = 96
+    """Pictures in the film."""
 
     def __post_init__(self) -> None:
-        if self.rows < 16 or self.columns < 16:
-            raise OptionError("`rows` and `columns`: at least 16 pixels are needed")
+        super().__post_init__()
         if self.frames < 1:
             raise OptionError(f"`frames` {self.frames}: at least 1 is needed")
-        if not -90 <= self.elevation <= 90:
-            raise OptionError(f"`elevation` {self.elevation}: must be -90 to 90 degrees")
-        if not (isfinite(self.azimuth) and isfinite(self.turn)):
-            raise OptionError("`azimuth` and `turn`: expected numbers of degrees")
-        if not 0 < self.fps <= 1000:
-            raise OptionError(f"`fps` {self.fps}: must be positive, at most 1000")
 
 
 class Turntable:
@@ -114,7 +99,7 @@ class Turntable:
         facing = np.where((normals @ forward)[:, None] > 0, -normals, normals)
         lambert = np.clip(facing @ (light / np.linalg.norm(light)), 0, 1)
         picture = np.empty((rows, columns, 3), np.float32)
-        picture[:] = config.background
+        picture[:] = parse_colour(config.background)
         picture[covered] = shader(triangles, weights) * (AMBIENT + (1 - AMBIENT) * lambert[:, None])
         shape = (config.rows, SAMPLES, config.columns, SAMPLES, 3)
         return picture.reshape(shape).mean((1, 3))
@@ -135,10 +120,10 @@ def _vertex_normals(points: AnyArray, faces: AnyArray) -> AnyArray:
     return total[place]
 
 
-def solid(table: Turntable, place: Placement, block: FloatArray) -> Shader:
+def solid(table: Turntable, place: Placement, block: Block) -> Shader:
     """Shows a block of solid texture, as baked at endless resolution."""
     points = table.at(table.points)
-    return lambda triangles, weights: sample_block(block, place(points(triangles, weights)))
+    return lambda triangles, weights: block.at(place(points(triangles, weights)))
 
 
 def textured(table: Turntable, mesh: Mesh) -> Shader:

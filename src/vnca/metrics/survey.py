@@ -151,7 +151,7 @@ def survey(
     Args:
         paintings: Its frames in order.
         count: How many there are, one at least.
-        rule: What paints them.
+        rule: What paints them, for cells as fine as its automaton's.
         setup: How they are looked at.
         metric: What they are compared with.
         judges: Networks that compare them with it, too.
@@ -188,7 +188,7 @@ def survey(
                 ring,
                 joined_style_score([style_score(metric, ring)]),
                 around(setup, ring[: len(RING)]),
-                _texture(rule, smoke, seen_by),
+                _texture(rule, painting.coarse or smoke, seen_by),
             )
     assert turn is not None, "there are fewer paintings than was said"
     return Survey(

@@ -1,6 +1,9 @@
 """The block of solid texture that a rule grows; it tiles space."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,11 +11,13 @@ from vnca.core.errors import OptionError
 from vnca.core.typing import AnyArray, FloatArray
 from vnca.engine.domain import Domain
 from vnca.engine.session import Compute, open_session
-from vnca.rule.paint import colours
+from vnca.painting.parts import colour_means, parts_of_cells, require_refinement
+from vnca.rule.paint import Between, colours
 from vnca.rule.rule import Rule
 
 SMALLEST, LARGEST = 8, 384
 """Cells along an edge."""
+_POINTS_AT_ONCE = 1 << 18
 KIND = "texture"
 """What the model of a solid texture says it is, under `kind` in its record of training."""
 
@@ -28,6 +33,76 @@ def block_domain(size: int) -> Domain:
     return Domain.from_mask(np.ones((size,) * 3, bool), (0, 0, 0), border="circular")
 
 
+class _Decoded(NamedTuple):
+    """The state of a block that a decoder shows."""
+
+    domain: Domain
+    state: FloatArray
+    between: Between
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A block of solid texture, which tiles space.
+
+    Attributes:
+        colours: Linear RGB `[s, s, s, 3]` of its cells.
+    """
+
+    colours: FloatArray
+    _decoded: _Decoded | None = None
+
+    @classmethod
+    def of_state(cls, domain: Domain, state: FloatArray, between: Between) -> "Block":
+        """What a rule's state `[n + 1, C]` shows: between cells, what its decoder says, if any."""
+        if not between.has_decoder:
+            return cls(domain.scatter(colours(state[:-1]), domain.box))
+        decoded = _Decoded(domain, state, between)
+        return cls(_parts(decoded, 1), decoded)
+
+    def __len__(self) -> int:
+        """Cells along an edge."""
+        return len(self.colours)
+
+    def refined(self, factor: int) -> FloatArray:
+        """Linear RGB on a grid `factor` times as fine, `[factor · s, …, 3]`.
+
+        Raises:
+            OptionError: If the factor is not from 1 to 8.
+        """
+        require_refinement(factor)
+        if self._decoded is not None:
+            return _parts(self._decoded, factor)
+        if factor == 1:
+            return self.colours
+        size = factor * len(self)
+        # Part i of the finer grid is centred there.
+        along = (np.arange(size) + 0.5) / factor - 0.5
+        points = np.stack(np.meshgrid(along, along, along, indexing="ij"), -1).reshape(-1, 3)
+        return sample_block(self.colours, points).reshape(size, size, size, 3)
+
+    def at(self, points: AnyArray, width: float = 0.0) -> FloatArray:
+        """Linear RGB `[n, 3]` at points in cells, whose centres lie on whole numbers.
+
+        Args:
+            points: `[n, 3]`.
+            width: Of what a point stands for, in cells: what a decoder shows finer than that is
+                averaged, instead of becoming grain.
+        """
+        if self._decoded is None:
+            return sample_block(self.colours, points)
+        domain, state, between = self._decoded
+        offsets = width / 4 * np.array(list(product((-1, 1), repeat=3))) if width else np.zeros(1)
+        found = np.zeros((len(points), 3), np.float32)
+        for start in range(0, len(points), _POINTS_AT_ONCE):
+            some = slice(start, start + _POINTS_AT_ONCE)
+            for offset in offsets:
+                corners = domain.corners(np.asarray(points[some]) + offset)
+                found[some] += colours(between.at(state, *corners))
+        found /= len(offsets)
+        return found
+
+
 def grow(
     rule: Rule,
     size: int,
@@ -37,7 +112,7 @@ def grow(
     pause: int = 0,
     compute: Compute | None = None,
     watch: Callable[[], None] | None = None,
-) -> Iterator[FloatArray]:
+) -> Iterator[Block]:
     """Grow a block from nothing, and let it live on: one block after the other, without end.
 
     Args:
@@ -48,18 +123,17 @@ def grow(
         pause: Steps between two blocks.
         compute: How steps are computed.
         watch: Is called after each step.
-
-    Yields:
-        Linear RGB `[size, size, size, 3]`.
     """
+    compute = compute or Compute()
     domain = block_domain(size)
     nothing = np.zeros((len(domain), rule.config.conditioning_width), np.float32)
     session = open_session(rule.automaton(seed), domain, nothing, compute)
+    between = Between(rule, compute.backend, threads=compute.threads)
     state = session.upload(domain.seed(rule.config.channels))
     done, waiting = 0, steps
     while True:
         state = session.run(state, range(done, done + waiting), watch)
-        yield domain.scatter(colours(session.read(state)[:-1]), domain.box)
+        yield Block.of_state(domain, session.read(state), between)
         done, waiting = done + waiting, pause
 
 
@@ -97,3 +171,16 @@ def border_jump(block: FloatArray) -> float:
         across.append(difference.take(0, axis).mean())
         inside.append(difference.take(range(1, block.shape[axis]), axis).mean())
     return float(np.mean(across) / max(np.mean(inside), 1e-12))
+
+
+def _parts(decoded: _Decoded, factor: int) -> FloatArray:
+    """Linear RGB on a grid `factor` times as fine, of what a decoder shows."""
+    domain, state, between = decoded
+    values = []
+    for _, seen in parts_of_cells(between, state, domain, factor):
+        values.append(colour_means(seen))
+    cells, size = domain.box.shape[0], factor * domain.box.shape[0]
+    parts = np.concatenate(values).reshape(len(domain), *3 * (factor,), 3)
+    dense = domain.scatter(parts, domain.box)
+    dense = dense.reshape(*3 * (cells,), *3 * (factor,), 3).transpose(0, 3, 1, 4, 2, 5, 6)
+    return np.ascontiguousarray(dense).reshape(size, size, size, 3)

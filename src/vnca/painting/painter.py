@@ -1,10 +1,12 @@
 """Painting a sequence of files: when one of them is broken, and going on after an end."""
 
+import hashlib
+import json
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -19,17 +21,20 @@ from vnca.core.errors import (
 from vnca.core.files import existing_file, remove_file, remove_leftovers
 from vnca.core.lattice import Lattice
 from vnca.core.volume import Volume
-from vnca.io.provenance import Provenance
+from vnca.io.provenance import Provenance, read_provenance
 from vnca.io.sequence import Frame, FrameSequence
-from vnca.io.smoke import SmokeFormat, missing_velocity, read_smoke, write_painted
-from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
+from vnca.io.smoke import SmokeFormat, read_smoke, write_painted
+from vnca.io.smoke_format import up_axis_of
 from vnca.painting.ahead import read_ahead
 from vnca.painting.roll import Roll, RollState
+from vnca.painting.still import StillSmoke
 from vnca.painting.unfinished import Source, Unfinished
 
 OnError = Literal["stop", "skip", "hold"]
 BROKEN = (FileFormatError, GridError, ShapeError)
 """What a frame is that cannot be read, or is another than it was a moment ago."""
+MARK = "painting"
+"""Entry of a painted file that tells frames of one painting from those of others."""
 _SAVING_SHARE = 0.02
 """Share of the time that may go into keeping the state."""
 
@@ -60,8 +65,7 @@ class Painter:
         conditions: What else must be the same for a painting to be gone on with: its bytes
             follow from these, the sequence, the rule and nothing else.
         tell: Is given lines for the user.
-        refine: How many times as fine as the smoke's the grid of the painting is; what the roll
-            paints is refined smoke.
+        refine: How many times as fine as the smoke's the grid of the painting is.
         facts: What else files tell of their painting, beside how opaque it is to be seen.
     """
 
@@ -76,7 +80,11 @@ class Painter:
     tell: Callable[[str], None]
     refine: int = 1
     facts: Mapping[str, str | int | float] = field(default_factory=dict)
-    _told: set[str] = field(default_factory=set, init=False)
+    _still: StillSmoke = field(init=False)
+
+    def __post_init__(self) -> None:
+        still = StillSmoke(self.roll.rule, self.smoke, self.tell)
+        object.__setattr__(self, "_still", still)
 
     @property
     def unfinished_path(self) -> Path:
@@ -87,13 +95,24 @@ class Painter:
         """The file a frame is painted to."""
         return self.out / f"{frame.path.stem}.vdb"
 
-    def begin(self, *, resume: bool) -> Unfinished:
+    @cached_property
+    def mark(self) -> str:
+        """What painted files tell of the painting they are of: equal under equal conditions."""
+        described = json.dumps(self.conditions, sort_keys=True)
+        return hashlib.blake2b(described.encode(), digest_size=8).hexdigest()
+
+    def begin(self, *, resume: bool, overwrite: bool) -> Unfinished:
         """Where to start: at the first frame, or where an earlier run ended.
+
+        Args:
+            resume: Start where an earlier run of this painting ended, if there was one.
+            overwrite: Replace frames of others.
 
         Raises:
             OptionError: If it ended under other conditions.
             FileFormatError: If its state is damaged.
-            OutputError: If the folder cannot be written.
+            OutputError: If the folder cannot be written, or holds frames that are not to be
+                replaced.
         """
         path = self.unfinished_path
         remove_leftovers(self.out, {self.target(f).name for f in self.sequence} | {path.name})
@@ -102,11 +121,41 @@ class Painter:
             self._require_unchanged(unfinished.sources)
             self.tell(f"{self.out}: going on after {len(unfinished.sources)} frames")
             return unfinished
-        if path.exists():
-            self.tell(f"{self.out}: starting anew; `resume` goes on with the painting there")
-        elif resume:
+        if resume and self._is_complete():
+            self.tell(f"{self.out}: all {len(self.sequence)} frames are painted already")
+            sources = tuple(self._source(at) for at in range(len(self.sequence)))
+            return Unfinished(self.conditions, sources, self.roll.start())
+        there = [target for target in map(self.target, self.sequence) if target.exists()]
+        if path.exists() and not overwrite:
+            raise OutputError(
+                f"{self.out}: holds a painting that was interrupted; go on with `resume`, or "
+                "choose another `out` or `overwrite`"
+            )
+        if there and not overwrite:
+            raise OutputError(
+                f"{self.out}: holds painted frames already, such as {there[0].name}"
+                f"{', and none to go on from' if resume else ''}; choose another `out` or "
+                "`overwrite`"
+            )
+        if resume:
             self.tell(f"{self.out}: nothing unfinished there; starting with the first frame")
         return Unfinished(self.conditions, (), self.roll.start())
+
+    def _is_complete(self) -> bool:
+        """Whether every frame is there, painted by this rule in this way from what it is now."""
+        for frame in self.sequence:
+            target = self.target(frame)
+            if not target.exists() or not frame.path.exists():
+                return False
+            if frame.path.stat().st_mtime_ns > target.stat().st_mtime_ns:
+                return False
+            try:
+                told = read_provenance(target)
+            except FileFormatError:
+                return False
+            if told is None or told.facts.get(MARK) != self.mark:
+                return False
+        return True
 
     def paint(self, unfinished: Unfinished) -> Generator[Path | None, None, None]:
         """Go on from there to the end of the sequence.
@@ -164,18 +213,19 @@ class Painter:
 
     def _write(self, frame: Frame, read: _Read, state: RollState) -> RollState:
         """Paint smoke to the file of a frame; the state after it."""
-        self._tell_without_velocity(read)
+        self._still.look(read.smoke, read.frame.path)
         painting = self.roll.paint(read.smoke, state)
         if frame == self.sequence[0]:
-            # From here on, frames of an earlier painting are overwritten.
-            self.discard()
+            # From here on frames of an earlier painting are overwritten, and after an end at any
+            # moment it is this one that can be gone on with.
+            Unfinished(self.conditions, (), self.roll.start()).save(self.unfinished_path)
         write_painted(
             self.target(frame),
             read.frame.path,
             self.smoke,
             density=painting.density_field,
             colour=painting.colour_field,
-            box=read.smoke.box,
+            box=painting.smoke.box,
             lattice=self.lattice,
             colour_grids=self.colour_grids,
             refine=self.refine,
@@ -183,37 +233,24 @@ class Painter:
         )
         return painting.state
 
-    def _tell_without_velocity(self, read: _Read) -> None:
-        """Say once that the rule wants a velocity which a frame does not have."""
-        if (
-            self.roll.rule.config.is_conditioned_on("velocity")
-            and self.smoke.velocity_grid != NO_VELOCITY
-            and read.smoke.velocity_field is None
-            and not read.smoke.box.is_empty
-            and "velocity" not in self._told
-        ):
-            self._told.add("velocity")
-            missing = missing_velocity(read.frame.path)
-            self.tell(f"{missing}; frames without are painted as if their smoke rested")
-
     def _provenance(self, read: _Read) -> Provenance:
         """What the painting of a frame tells of itself."""
         scales = self.roll.rule.scales
         return Provenance(
             scales.extinction(read.smoke.cell_length),
-            scales.gamma * self.refine,
+            scales.gamma * self.roll.grid,
             up_axis_of(read.frame.path, self.smoke),
-            self.facts,
+            {**self.facts, MARK: self.mark},
         )
 
     def _read(self, at: int) -> _Read | VncaError:
         """A frame of the sequence, or what is wrong with it."""
         frame = self.sequence[at]
         try:
-            status = existing_file(frame.path).stat()
+            source = self._source(at)
             smoke = read_smoke(
                 frame.path, self.smoke, frame=frame.number, lattice=self.lattice
-            ).refined(self.refine)
+            ).refined(self.roll.grid)
         except BROKEN as error:
             return error
         except OSError as error:
@@ -223,7 +260,12 @@ class Painter:
                 f"{frame.path}: has changed since the start and now has smoke beyond the box of "
                 "the sequence; start anew"
             )
-        return _Read(Source(at, status.st_size, status.st_mtime_ns), frame, smoke)
+        return _Read(source, frame, smoke)
+
+    def _source(self, at: int) -> Source:
+        """What a frame of the sequence is painted from, as it is now."""
+        status = existing_file(self.sequence[at].path).stat()
+        return Source(at, status.st_size, status.st_mtime_ns)
 
     def _held(self, sources: Sequence[Source | None]) -> _Read | None:
         """The last frame that was not broken, where it may be wanted again."""

@@ -22,8 +22,9 @@ from vnca.engine.session import Compute, open_session
 from vnca.io.smoke_format import on_one_lattice
 from vnca.io.velocity import extrapolated
 from vnca.painting.config import StylizeConfig
+from vnca.painting.parts import colour_means, density_means, parts_of_cells
 from vnca.rule.conditioning import priors
-from vnca.rule.paint import colours, density_factors
+from vnca.rule.paint import Between, colours, density_factors
 from vnca.rule.rule import SMOKE_THRESHOLD, Rule
 
 UNPAINTED = 1.0
@@ -61,27 +62,29 @@ class Painting:
     """One painted frame, on the same cells as its smoke.
 
     Attributes:
-        smoke: The frame as it was read.
+        smoke: The frame as it was read, on the grid of the painting.
         density: `[x, y, z]`, painted, in the units of the file; the array is made when it is asked
             for, as the smoke's is.
         colour: Likewise, linear RGB `[x, y, z, 3]`; beside the living cells continued from them,
             white farther away.
         state: What it leaves to the next frame.
+        coarse: The frame on the grid of the automaton; None where that is not known.
     """
 
     smoke: Volume
     density: FloatArray
     colour: FloatArray
     state: RollState
+    coarse: Volume | None = None
 
     @classmethod
     def of_fields(
-        cls, smoke: Volume, density: Field, colour: Field, state: RollState
+        cls, smoke: Volume, density: Field, colour: Field, state: RollState, coarse: Volume
     ) -> "Painting":
         """A painting given by where there is smoke and colour."""
         painted: Any = density
         coloured: Any = colour
-        return cls(smoke, painted, coloured, state)
+        return cls(smoke, painted, coloured, state, coarse)
 
     @cached_property
     def density_field(self) -> Field:
@@ -105,6 +108,9 @@ class Roll:
             files' headers before the first frame is read.
         compute: How steps are computed.
         colour_dilation: How many cells beyond the living ones their colour goes on.
+        grid: How many times as fine as the grid of the smoke the automaton's is.
+        finer: How many times as fine as the automaton's the grid of the painting is; what is there
+            between the cells, the decoder says.
     """
 
     rule: Rule
@@ -112,6 +118,8 @@ class Roll:
     box: Box
     compute: Compute = field(default_factory=Compute)
     colour_dilation: int = COLOUR_DILATION
+    grid: int = 1
+    finer: int = 1
 
     @property
     def steps_per_frame(self) -> int:
@@ -125,7 +133,13 @@ class Roll:
         return self.config.domain or self.rule.config.domain
 
     def refined(self, factor: int) -> "Roll":
-        """The same on a grid `factor` times as fine along each axis, for smoke refined alike."""
+        """The same for paintings on a grid `factor` times as fine along each axis.
+
+        A decoder is asked at so many more points; without one, the automaton runs on a grid as
+        fine.
+        """
+        if self.rule.decoder is not None:
+            return replace(self, finer=factor * self.finer)
         asked = self.config.steps_per_frame
         steps = None if asked is None else factor * asked
         return replace(
@@ -134,6 +148,7 @@ class Roll:
             config=replace(self.config, steps_per_frame=steps),
             box=self.box.refined(factor),
             colour_dilation=self.colour_dilation * factor,
+            grid=self.grid * factor,
         )
 
     def start(self) -> RollState:
@@ -145,13 +160,17 @@ class Roll:
 
         A frame without smoke passes through. The painting starts afresh after it, unless cells
         live in the whole box.
-        """
-        return self._shown(smoke, self._stepped(smoke, state))
 
-    def _stepped(self, smoke: Volume, state: RollState) -> RollState:
+        Args:
+            smoke: On a grid as fine as the automaton's.
+            state: What the frame before it left.
+        """
+        domain = self._domain(smoke)
+        return self._shown(smoke, domain, self._stepped(smoke, domain, state))
+
+    def _stepped(self, smoke: Volume, domain: Domain, state: RollState) -> RollState:
         """The state after the steps of a frame."""
         rule, config = self.rule, self.config
-        domain = self._domain(smoke)
         if len(domain) == 0:
             return RollState.empty(rule.config.channels, state.steps_done)
         steps = self.steps_per_frame
@@ -166,22 +185,44 @@ class Roll:
         values = session.read(session.run(uploaded, range(state.steps_done, done)))
         return RollState(domain.cells, values, done)
 
-    def _shown(self, smoke: Volume, state: RollState) -> Painting:
-        """The frame as a state shows it."""
-        at, box = state.cells, smoke.box
+    def _shown(self, coarse: Volume, domain: Domain, state: RollState) -> Painting:
+        """The frame as a state shows it, on the grid of the painting."""
+        smoke = coarse.refined(self.finer)
+        box = smoke.box
+        at, colour, factors = self._parts(domain, state)
         inside = ((at >= box.lower) & (at < box.upper)).all(axis=1)
-        at, cells = at[inside], state.values[:-1][inside]
-        painted = UNPAINTED + self.config.strength * (colours(cells) - UNPAINTED)
+        at, colour, factors = at[inside], colour[inside], factors[inside]
+        painted = UNPAINTED + self.config.strength * (colour - UNPAINTED)
         colour = Field.from_cells(at, painted, box, outside=UNPAINTED)
         known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
-        colour, known = extrapolated(colour, known, self.colour_dilation)
+        colour, known = extrapolated(colour, known, self.colour_dilation * self.finer)
         colour.values[~known.values] = UNPAINTED
-        factors = Field.from_cells(
-            at, density_factors(cells, strength=self.config.density_strength), box, outside=1.0
-        )
+        factors = Field.from_cells(at, factors, box, outside=1.0)
         density = smoke.density_field
         density = replace(density, values=density.values * factors.blocks(density.bricks))
-        return Painting.of_fields(smoke, density, replace(colour, outside=UNPAINTED), state)
+        colour = replace(colour, outside=UNPAINTED)
+        return Painting.of_fields(smoke, density, colour, state, coarse)
+
+    def _parts(self, domain: Domain, state: RollState) -> tuple[IntArray, FloatArray, FloatArray]:
+        """What is painted: cells `[m, 3]`, their linear RGB `[m, 3]`, and factors of density `[m]`.
+
+        Of a decoder, each is the mean over a part of a cell: what is finer than the grid of the
+        painting would be grain on it.
+        """
+        strength = self.config.density_strength
+        if self.rule.decoder is None:
+            cells = state.values[:-1]
+            return state.cells, colours(cells), density_factors(cells, strength=strength)
+        between = Between(self.rule, self.compute.backend, threads=self.compute.threads)
+        parts = self.finer
+        colour = np.empty((len(domain), *3 * (parts,), 3), np.float32)
+        factors = np.empty(colour.shape[:-1], np.float32)
+        for some, seen in parts_of_cells(between, state.values, domain, parts):
+            colour[some] = colour_means(seen)
+            factors[some] = density_means(seen, strength=strength)
+        offsets = np.indices(3 * (parts,), np.int32).reshape(3, -1).T
+        at = (state.cells[:, None] * parts + offsets).reshape(-1, 3)
+        return at.astype(np.int32, copy=False), colour.reshape(-1, 3), factors.reshape(-1)
 
     def _domain(self, smoke: Volume) -> Domain:
         """The cells that live in a frame."""
@@ -221,6 +262,6 @@ def stylize(
     roll = Roll(rule, config, box, compute or Compute()).refined(refine)
     state = roll.start()
     for smoke in on_one_lattice(frames):
-        painting = roll.paint(smoke.refined(refine), state)
+        painting = roll.paint(smoke.refined(roll.grid), state)
         state = painting.state
         yield painting

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import vnca
 from vnca.bench.measurement import run_facts
@@ -29,7 +29,9 @@ from vnca.metrics.style import SMALLEST, StyleMetric
 from vnca.metrics.style_score import Judge
 from vnca.metrics.survey import Survey, survey
 from vnca.painting.config import StylizeConfig
+from vnca.painting.parts import require_refinement
 from vnca.painting.roll import stylize
+from vnca.painting.still import StillSmoke
 from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY, PICTURE_CELLS, loaded, recorded_smoke
 from vnca.recipe.sequence import open_sequence, placed, region_of, sequence_region, volumes
@@ -60,8 +62,8 @@ class EvaluateRun:
     style_scale: float | None = None
     """Shorter side of the picture relative to the views; as many cells as in the training unless
     given."""
-    refine: Literal[1, 2, 3, 4] = 1
-    """Paint on a grid so many times as fine as that of the smoke."""
+    refine: int = 1
+    """Paint on a grid so many times as fine as that of the smoke, at most 8."""
     size: int = SIZE
     """Rows and columns of the views, pixels."""
     backend: str = "auto"
@@ -73,6 +75,7 @@ class EvaluateRun:
 
     def __post_init__(self) -> None:
         Compute(self.backend)
+        require_refinement(self.refine)
         if self.size < 64:
             raise OptionError(f"`size` {self.size}: at least 64 pixels are needed")
         if self.style_scale is not None:
@@ -120,7 +123,7 @@ def evaluate(
     out: str | Path | None = None,
     frames: str | None = None,
     style_scale: float | None = None,
-    refine: Literal[1, 2, 3, 4] = 1,
+    refine: int = 1,
     size: int = SIZE,
     backend: str = "auto",
     watch: Watch = SILENT,
@@ -176,17 +179,23 @@ def evaluate(
     if frames is not None:
         raise OptionError("`frames`: chooses among files; give the volumes that are wanted")
     given, region = region_of(sequence)
-    smoke_given = _Smoke(region, len(given), lambda _: iter(given), "volumes in memory", "memory")
-    return run(asked, model, watch, smoke_given)
+
+    def read(still: StillSmoke | None) -> Iterator[Volume]:
+        return iter(given) if still is None else still.watched(given, [None] * len(given))
+
+    return run(asked, model, watch, _Smoke(region, len(given), read, "volumes in memory", "memory"))
 
 
 @dataclass(frozen=True)
 class _Smoke:
-    """A sequence to be read as often as wanted: where it is, and what a report calls it."""
+    """A sequence to be read as often as wanted: where it is, and what a report calls it.
+
+    Its velocity is read only for who paints it, and is told of where it is missing.
+    """
 
     region: Region
     count: int
-    read: Callable[[bool], Iterator[Volume]]
+    read: Callable[[StillSmoke | None], Iterator[Volume]]
     first: str
     folder: str
 
@@ -217,10 +226,10 @@ def run(
     rule = placed(model.rule, given.region, watch)
     refine = options.refine
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.
-    setup = Setup.around(given.read(False), rule, options.size).refined(refine)
+    setup = Setup.around(given.read(None), rule, options.size).refined(refine)
     metric = StyleMetric(picture, _checked_size(width(setup), f"`size` {options.size}"))
     paintings = stylize(
-        given.read(True),
+        given.read(StillSmoke(rule, options.smoke, watch.note)),
         rule,
         options.config,
         box=given.region.box,
@@ -229,7 +238,8 @@ def run(
     )
     paintings = tracked(paintings, watch, "painting and measuring", given.count, "frames")
     judges = _judges(model, metric, options.size)
-    found = survey(paintings, given.count, rule.refined(refine), setup, metric, judges)
+    cells = 1 if rule.decoder is not None else refine
+    found = survey(paintings, given.count, rule.refined(cells), setup, metric, judges)
     listed = measures(found)
     watch.note(f"trained with features '{model.training.get('features', 'unknown')}'")
     if out is None:
@@ -246,16 +256,14 @@ def run(
 
 def _files(sequence: FrameSequence, options: EvaluateRun, watch: Watch) -> _Smoke:
     smoke = with_fitted_scale(options.smoke, sequence)
-    still = dataclasses.replace(smoke, velocity_grid=NO_VELOCITY)
+    at_rest = dataclasses.replace(smoke, velocity_grid=NO_VELOCITY)
     region = sequence_region(sequence, smoke, watch)
     first = sequence[0].path
-    return _Smoke(
-        region,
-        len(sequence),
-        lambda moving: volumes(sequence, smoke if moving else still, region.lattice),
-        first.name,
-        first.resolve().parent.name,
-    )
+
+    def read(still: StillSmoke | None) -> Iterator[Volume]:
+        return volumes(sequence, at_rest if still is None else smoke, region.lattice, still)
+
+    return _Smoke(region, len(sequence), read, first.name, first.resolve().parent.name)
 
 
 def _facts(options: EvaluateRun, model: Model, found: Survey, smoke: _Smoke) -> Mapping[str, str]:

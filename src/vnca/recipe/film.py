@@ -1,7 +1,6 @@
 """Filming painted frames as they come; torch is needed once there is something to film."""
 
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, NamedTuple
@@ -9,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vnca.core.camera import frame_box
-from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.shot import Shot, parse_colour
 from vnca.core.typing import AnyArray, FloatArray
 from vnca.core.volume import Volume
 from vnca.io.film import FilmWriter
@@ -22,43 +21,21 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class FilmConfig:
+class FilmConfig(Shot):
     """How smoke is filmed."""
 
-    rows: int = 384
-    """Height of the film, pixels."""
-    columns: int = 384
-    """Width of the film, pixels."""
-    azimuth: float = 0.0
-    """Where the camera stands, degrees around the smoke; 0 is the front, looking along +y."""
-    elevation: float = 5.0
-    """How far above the horizon it stands, degrees."""
-    turn: float = 0.0
-    """Degrees the camera walks around the smoke over the whole film; 360 is a turntable."""
     field_of_view: float = 30.0
     """Vertical, degrees; 0 films without perspective."""
-    fps: float = 24.0
-    """Frames per second."""
     step: float = 0.5
     """Distance between samples along a ray, in cells, across where these are thinnest; a surface
     shows terraces where it is long."""
-    background: str = "#101014"
-    """Colour behind the smoke, #rrggbb."""
 
     def __post_init__(self) -> None:
-        if self.rows < 16 or self.columns < 16:
-            raise OptionError("`film.rows` and `film.columns`: at least 16 pixels are needed")
-        if not 0 < self.fps <= 1000:
-            raise OptionError(f"`film.fps` {self.fps}: must be positive, at most 1000")
+        super().__post_init__()
         if not 0 <= self.field_of_view < 120:
             raise OptionError(f"`film.field_of_view` {self.field_of_view}: must be 0 to 120")
-        if not -90 <= self.elevation <= 90:
-            raise OptionError(f"`film.elevation` {self.elevation}: must be -90 to 90 degrees")
-        if not (isfinite(self.azimuth) and isfinite(self.turn)):
-            raise OptionError("`film.azimuth` and `film.turn`: expected numbers of degrees")
         if not 0 < self.step <= 4:
             raise OptionError(f"`film.step` {self.step}: must be above 0, at most 4 cells")
-        parse_colour(self.background)
 
 
 class Shown(NamedTuple):
@@ -186,19 +163,3 @@ def picture(
 def _thinnest(cells_to_world: AnyArray) -> float:
     """The least distance in the world between two neighbouring layers of cells."""
     return float(1 / np.linalg.norm(np.linalg.inv(cells_to_world[:3, :3]), axis=1).max())
-
-
-def parse_colour(text: str) -> list[float]:
-    """Linear RGB of `#rrggbb`.
-
-    Raises:
-        OptionError: If the text is not such a colour.
-    """
-    digits = text.removeprefix("#")
-    try:
-        values = bytes.fromhex(digits)
-    except ValueError:
-        values = b""
-    if len(values) != 3:
-        raise OptionError(f"`film.background` '{text}': expected a colour such as #101014")
-    return srgb_to_linear(np.frombuffer(values, np.uint8) / 255).tolist()

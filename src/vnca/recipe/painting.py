@@ -8,11 +8,11 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
-from typing import Literal
 
 import vnca
 from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import remove_leftovers, writable_file, writable_folder
+from vnca.core.records import changed_fields
 from vnca.core.volume import refined_transform
 from vnca.core.watch import Watch
 from vnca.engine.session import Compute, choose
@@ -23,6 +23,7 @@ from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import OnError, Painter
+from vnca.painting.parts import require_refinement
 from vnca.painting.roll import Roll
 from vnca.recipe.film import Film, FilmConfig, Shown
 from vnca.recipe.sequence import (
@@ -52,8 +53,8 @@ class StylizeRun:
     """Names under which the colour is written: Cd, `color` as Blender names it, or several."""
     preview: Path | None = None
     """Film of the painting: mp4, gif or webp."""
-    refine: Literal[1, 2, 3, 4] = 1
-    """Paint on a grid so many times as fine as that of the smoke."""
+    refine: int = 1
+    """Paint on a grid so many times as fine as that of the smoke, at most 8."""
     gamma: float | None = None
     """Extinction of density 1, per cell of the smoke, with which the painting is to be seen:
     brightness without training again. It is told in the files."""
@@ -66,6 +67,9 @@ class StylizeRun:
     processor has it."""
     resume: bool = False
     """Go on with a painting that was ended before its last frame, to the very same files."""
+    overwrite: bool = False
+    """Replace painted frames that the folder holds; with `resume`, where those are of another
+    painting."""
     on_error: OnError = "stop"
     """With a frame that cannot be read: stop, skip it, or hold the smoke of the one before."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
@@ -77,12 +81,15 @@ class StylizeRun:
 
     def __post_init__(self) -> None:
         Compute(self.backend, precision=self.precision)
+        require_refinement(self.refine)
         for name in ("gamma", "density_scale"):
             value = getattr(self, name)
             if value is not None and not 0 < value < inf:
                 raise OptionError(f"`{name}` {value}: must be positive")
         if self.preview is not None and self.preview.suffix.lower() not in FILMS:
             raise OptionError(f"`preview` {self.preview}: expected a film ({', '.join(FILMS)})")
+        if self.preview is None and (idle := changed_fields(self.film, FilmConfig())):
+            raise OptionError(f"`film.{idle[0]}`: shapes a film; name one with `preview`")
         if not self.colour_grid:
             raise OptionError("`colour_grid`: at least one name is needed")
         names = (self.smoke.density_grid, *self.colour_grid)
@@ -177,7 +184,8 @@ def _digest(rule: Rule) -> str:
     place = rule.place and [rule.place.lattice.to_world.tolist(), rule.place.box]
     described = json.dumps([shape, rule.scales.velocity, place])
     digest = hashlib.blake2b(described.encode(), digest_size=16)
-    for weights in (rule.hidden, rule.bias, rule.output):
+    decoder = rule.decoder.weights if rule.decoder is not None else ()
+    for weights in (rule.hidden, rule.bias, rule.output, *decoder):
         digest.update(weights.tobytes())
     return digest.hexdigest()
 
@@ -187,7 +195,7 @@ def _paint(painter: Painter, options: StylizeRun, watch: Watch) -> Iterator[Path
     total, finished = len(painter.sequence), 0
     with ExitStack() as stack:
         film = _film(options, painter, stack, watch)
-        unfinished = painter.begin(resume=options.resume)
+        unfinished = painter.begin(resume=options.resume, overwrite=options.overwrite)
         already = len(unfinished.sources)
         try:
             with closing(painter.paint(unfinished)) as paths:
@@ -214,7 +222,7 @@ def _film(options: StylizeRun, painter: Painter, stack: ExitStack, watch: Watch)
     """The film of a preview, if one is wanted and what it takes is installed."""
     if options.preview is None:
         return None
-    cells = refined_transform(painter.lattice.to_world, options.refine)
+    cells = refined_transform(painter.lattice.to_world, painter.roll.grid)
     bounds = region_bounds(painter.roll.box, cells)
     try:
         film = Film(options.preview, options.film, bounds, frames=len(painter.sequence))

@@ -12,6 +12,8 @@ import numpy as np
 
 from vnca.core.errors import OptionError, SequenceError
 from vnca.core.files import existing_file, writable_file
+from vnca.core.records import changed_fields
+from vnca.core.shot import parse_colour
 from vnca.core.typing import FloatArray
 from vnca.core.watch import SILENT, Watch, tracked
 from vnca.io.film import SUFFIXES as FILMS
@@ -22,9 +24,9 @@ from vnca.io.picture import write_image
 from vnca.io.provenance import read_provenance
 from vnca.io.sequence import FrameSequence
 from vnca.io.smoke import SmokeFormat
-from vnca.io.smoke_format import NO_VELOCITY
-from vnca.recipe.film import Bounds, Film, FilmConfig, Shown, parse_colour, picture
-from vnca.recipe.options import changed, distributed
+from vnca.io.smoke_format import NO_VELOCITY, UpAxis
+from vnca.recipe.film import Bounds, Film, FilmConfig, Shown, picture
+from vnca.recipe.options import changed
 from vnca.recipe.sequence import open_sequence, region_bounds, sequence_bounds, volumes
 from vnca.recipe.stylizing import PaintedFrame
 from vnca.rendering.brightness import gamma_for_cell_opacity
@@ -57,8 +59,11 @@ class RenderRun:
     """Put so many frames, evenly spaced, side by side into one picture."""
     transparent: bool = False
     """Leave the background out of pictures (png, exr)."""
-    smoke: SmokeFormat = field(default_factory=SmokeFormat)
-    """How smoke is read from files."""
+    density_grid: str = "density"
+    """Name of the density grid."""
+    up_axis: UpAxis | None = None
+    """Which axis of the file points up; as a painted file tells, else z in VDB files and y in npz
+    files, unless given."""
     film: FilmConfig = field(default_factory=FilmConfig)
     """The camera."""
 
@@ -80,11 +85,35 @@ class RenderRun:
             raise OptionError(f"`strip` {self.strip}: a number of frames, with a picture as `out`")
         if self.turntable and not self.is_film:
             raise OptionError("`turntable`: needs a film (mp4, gif, webp) as `out`")
+        self._refuse_idle_options()
+
+    def _refuse_idle_options(self) -> None:
+        """Refuse what would change nothing.
+
+        Raises:
+            OptionError: If there is such an option.
+        """
+        given = changed_fields(self.film, FilmConfig())
+        if self.turntable and "turn" in given:
+            raise OptionError("`film.turn`, `turntable`: one of them, not both")
+        for name in ("turn", "fps"):
+            if name in given and not self.is_film:
+                raise OptionError(f"`film.{name}`: a picture has none; `out` {self.out}")
+        if self.transparent and "background" in given:
+            raise OptionError("`film.background`, `transparent`: one of them, not both")
 
     @property
     def is_film(self) -> bool:
         """Whether the output is a film rather than pictures."""
         return self.out.suffix.lower() in FILMS
+
+    @property
+    def smoke(self) -> SmokeFormat:
+        """How files are read, without a velocity: nothing here needs one."""
+        # Beside a refined painting it would have coarser cells.
+        return SmokeFormat(
+            density_grid=self.density_grid, velocity_grid=NO_VELOCITY, up_axis=self.up_axis
+        )
 
 
 def render(
@@ -98,8 +127,9 @@ def render(
     strip: int = 0,
     transparent: bool = False,
     film: FilmConfig | Mapping[str, Any] | None = None,
+    density_grid: str = "density",
+    up_axis: UpAxis | None = None,
     watch: Watch = SILENT,
-    **options: Any,
 ) -> Path:
     """Make a film, or pictures, of a sequence, painted or not, as `vnca render` does.
 
@@ -113,8 +143,10 @@ def render(
         strip: Put so many frames, evenly spaced, side by side into one picture.
         transparent: Leave the background out of pictures.
         film: The camera: a `FilmConfig`, or some of its fields, as `{"rows": 512}`.
+        density_grid: The grid of the density in files.
+        up_axis: Which axis of the files points up; as painted files tell, else by their suffix,
+            unless given.
         watch: Is told how far it has come, and may cancel.
-        **options: Fields of `SmokeFormat`.
 
     Returns:
         `out`.
@@ -122,7 +154,6 @@ def render(
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
-    (smoke,) = distributed(options, SmokeFormat())
     asked = RenderRun(
         sequence=str(sequence) if isinstance(sequence, (str, Path)) else "",
         out=Path(out),
@@ -132,7 +163,8 @@ def render(
         turntable=turntable,
         strip=strip,
         transparent=transparent,
-        smoke=smoke,
+        density_grid=density_grid,
+        up_axis=up_axis,
         film=changed("film", FilmConfig(), film),
     )
     if isinstance(sequence, (str, Path)):
@@ -145,8 +177,10 @@ def render(
 
 def _render_frames(given: Sequence[PaintedFrame], options: RenderRun, watch: Watch) -> None:
     """Render frames in memory."""
-    if options.strip or options.gamma is not None or options.frames is not None:
-        raise OptionError("`strip`, `gamma`, `frames`: need a sequence in files")
+    of_files = ("strip", "gamma", "frames", "colour_grid", "density_grid", "up_axis")
+    plain = dataclasses.replace(options, **{name: getattr(RenderRun, name) for name in of_files})
+    if idle := changed_fields(options, plain):
+        raise OptionError(f"`{idle[0]}`: needs a sequence in files")
     _require_enough_names(len(given), options)
     writable_file(options.out)
     seen = [frame.volume for frame in given if not frame.volume.box.is_empty]
@@ -205,17 +239,14 @@ def strip(sequence: FrameSequence, options: RenderRun, count: int) -> list[Float
 def _as_painted(options: RenderRun, sequence: FrameSequence) -> RenderRun:
     """With the axis that points up as the files tell it, unless it is given."""
     told = read_provenance(existing_file(sequence[0].path))
-    if told is None or options.smoke.up_axis is not None:
+    if told is None or options.up_axis is not None:
         return options
-    return dataclasses.replace(
-        options, smoke=dataclasses.replace(options.smoke, up_axis=told.up_axis)
-    )
+    return dataclasses.replace(options, up_axis=told.up_axis)
 
 
 def _frames(sequence: FrameSequence, options: RenderRun) -> Iterator[Shown]:
     chosen: float | None = None  # one for all frames that do not tell, or brightness flickers
-    # Nothing here needs velocity, and beside a refined painting it has coarser cells.
-    seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
+    seen = options.smoke
     for frame, smoke in zip(sequence, volumes(sequence, seen), strict=True):
         colour = read_colour(frame.path, seen, grid=options.colour_grid, box=smoke.box)
         told = read_provenance(frame.path)

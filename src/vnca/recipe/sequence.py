@@ -20,6 +20,7 @@ from vnca.io.smoke import SmokeFormat, read_smoke, smoke_extent, with_fitted_sca
 from vnca.io.smoke_format import NO_VELOCITY, Extent, on_lattice, on_one_lattice
 from vnca.painting.ahead import read_ahead
 from vnca.painting.painter import BROKEN
+from vnca.painting.still import StillSmoke
 from vnca.rule.rule import SMOKE_THRESHOLD, Rule, density_scale
 
 
@@ -238,8 +239,19 @@ def placed(rule: Rule, region: Region, watch: Watch) -> Rule:
 
 
 def volumes(
-    sequence: FrameSequence, smoke: SmokeFormat, lattice: Lattice | None = None
+    sequence: FrameSequence,
+    smoke: SmokeFormat,
+    lattice: Lattice | None = None,
+    still: StillSmoke | None = None,
 ) -> Iterator[Volume]:
-    """The frames in order, as `read_smoke` gives them; the next is read while one is used."""
+    """The frames in order, as `read_smoke` gives them; the next is read while one is used.
+
+    Args:
+        sequence: The frames.
+        smoke: How they are read.
+        lattice: On whose cells they are wanted; each has its own unless given.
+        still: Is shown each of them.
+    """
     loads = (partial(read_smoke, f.path, smoke, frame=f.number, lattice=lattice) for f in sequence)
-    return read_ahead(loads)
+    read = read_ahead(loads)
+    return read if still is None else still.watched(read, [frame.path for frame in sequence])

@@ -24,10 +24,12 @@ from vnca.features.network import FeatureNetwork
 from vnca.io.picture import resize, to_srgb8
 from vnca.recipe.recorded import PICTURE_CELLS, recorded, restored
 from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import Rule
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.config import TrainingConfig
 from vnca.training.loop import Trainer
 from vnca.training.memory import is_out_of_memory, memory_advice, memory_budget
+from vnca.training.pretraining import SHAPE
 from vnca.training.preview import preview_sheet
 from vnca.training.run import NoFolder, RunFolder
 
@@ -296,6 +298,30 @@ def asked(kind: type[TrainingOptions], options: Any) -> dict[str, Any]:
     given = {field.name: getattr(options, field.name) for field in dataclasses.fields(kind)}
     paths = {name: value.absolute() for name, value in given.items() if isinstance(value, Path)}
     return recorded(kind(**{**given, **paths, "config": config}))
+
+
+def rule_like(path: Path, wanted: Rule) -> Rule:
+    """The rule of a model to start from.
+
+    Args:
+        path: Of the model, or of the folder of its run.
+        wanted: What its weights are to fit.
+
+    Raises:
+        VncaError: If it cannot be read, or is a rule of another shape.
+    """
+    rule = Model.load(path).rule
+    shapes = [{name: getattr(r.config, name) for name in SHAPE} for r in (rule, wanted)]
+    for its, ours in zip(shapes, (rule, wanted), strict=True):
+        its["decoder"] = ours.decoder.units if ours.decoder is not None else 0
+    its, ours = shapes
+    for name, value in its.items():
+        if value != ours[name]:
+            raise OptionError(
+                f"`init` {path}: was trained with `{name}` {value:g}; add that, in place of "
+                f"{ours[name]:g}"
+            )
+    return rule
 
 
 def shown_and_judged(trainer: Trainer, network: FeatureNetwork) -> dict[str, Any]:

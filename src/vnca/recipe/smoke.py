@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import torch
 
@@ -19,7 +19,7 @@ from vnca.io.picture import read_style, style_array
 from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY, on_lattice
 from vnca.recipe import texture
-from vnca.recipe.options import distributed, named
+from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY, load
 from vnca.recipe.sequence import beside, read_alone
 from vnca.recipe.session import (
@@ -30,23 +30,25 @@ from vnca.recipe.session import (
     choose_device,
     fitting,
     interrupted,
+    rule_like,
     run_folder,
     shown_and_judged,
 )
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule, RuleConfig
+from vnca.rule.rule import Rule
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.memory import memory_budget
-from vnca.training.pretraining import SHAPE, SHARES, pretraining_config, without_prior_weights
-from vnca.training.smoke_config import PRESETS, SmokeConfig
+from vnca.training.presets import DEFAULT
+from vnca.training.presets import preset as preset_of
+from vnca.training.pretraining import pretraining_config, without_prior_weights
+from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
 from vnca.training.texture_config import TextureConfig
 
 COMMAND = "train"
 TEXTURE_FOLDER = "texture"
 """Folder, in that of a run, of the texture that it begins with."""
-
-Preset = Literal["draft", "standard", "paper"]
+TEXTURE_OR_INIT = "`texture`, `init`: one of them, not both"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,24 +59,15 @@ class SmokeRun(TrainingOptions):
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
     style: Path
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
-    preset: Preset = "draft"
-    """Values of all hyperparameters that are not given."""
-    texture: float | None = None
-    """Iterations on a solid texture of the picture for each one on the smoke, made before those:
-    patterns come from there. 0 begins with nothing."""
-    begin_with: Path | None = None
-    """A solid texture of the picture that is trained already, to begin with instead."""
+    preset: str = DEFAULT
+    """Values of all hyperparameters that are not given: draft, standard, paper, or a TOML file."""
+    init: Path | None = None
+    """A solid texture of the picture that is trained already, to begin with instead of training
+    one as `texture` says."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: SmokeConfig = field(default_factory=SmokeConfig)
     """Hyperparameters."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.texture is not None and not 0 <= self.texture <= 1000:
-            raise OptionError(f"`texture` {self.texture:g}: must be from 0 to 1000")
-        if self.texture is not None and self.begin_with is not None:
-            raise OptionError("`texture`, `begin_with`: one of them, not both")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,9 +85,8 @@ def train(
     style: str | Path | AnyArray,
     *,
     out: str | Path | None = None,
-    preset: Preset = "draft",
-    texture: float | None = None,
-    begin_with: str | Path | None = None,
+    preset: str | Path = DEFAULT,
+    init: str | Path | None = None,
     overwrite: bool = False,
     resume: bool = False,
     preview_every: int = 50,
@@ -110,10 +102,9 @@ def train(
         style: A picture file, or an array `[r, c, 3]` of linear RGB from 0 to 1.
         out: Folder for the model, checkpoints, previews and loss curves. Unless given, nothing is
             written, and a training that is cancelled is lost.
-        preset: `draft` takes minutes, `standard` a night on a laptop; `paper` is the paper's.
-        texture: Iterations on a solid texture for each one on the smoke, made before those; chosen
-            by the preset unless given.
-        begin_with: A texture model of the picture to begin with instead.
+        preset: `draft` takes minutes, `standard` a night on a laptop; `paper` is the paper's. Or
+            the path of a TOML file.
+        init: A texture model of the picture to begin with, instead of training one first.
         overwrite: Replace the run that `out` holds.
         resume: Go on with the training that was interrupted in `out`, with the options that it
             began with, or else begin it.
@@ -122,23 +113,24 @@ def train(
         memory_budget: Memory for the program, such as `12GB`.
         watch: Is told how far it has come, and may cancel.
         **options: Fields of `SmokeFormat` (`velocity_units="mantaflow"`) and of `SmokeConfig`
-            (`iterations=400`, `view={"size": 96}`), in the place of the preset's.
+            (`iterations=400`, `texture=0`, `view={"size": 96}`), in the place of the preset's.
 
     Raises:
         VncaError: If an input cannot be used, the folder cannot be written, training diverges, or
             memory runs out.
         KeyboardInterrupt: If it is cancelled; the folder holds what it takes to resume.
     """
-    smoke, config = distributed(options, SmokeFormat(), named(preset, PRESETS, "preset"))
+    if "texture" in options and init is not None:
+        raise OptionError(TEXTURE_OR_INIT)
+    smoke, config = distributed(options, SmokeFormat(), preset_of(SmokeConfig, preset))
     volume = frame if isinstance(frame, Volume) else None
     picture = None if isinstance(style, (str, Path)) else style_array(style)
     asked = SmokeRun(
         frame=IN_MEMORY if isinstance(frame, Volume) else Path(frame),
         style=Path(style) if isinstance(style, (str, Path)) else IN_MEMORY,
         out=None if out is None else Path(out),
-        preset=preset,
-        texture=texture,
-        begin_with=None if begin_with is None else Path(begin_with),
+        preset=str(preset),
+        init=None if init is None else Path(init),
         overwrite=overwrite,
         preview_every=preview_every,
         device=device,
@@ -210,7 +202,7 @@ def run(
     training = {
         "frame": options.frame.name,
         "style": options.style.name,
-        "preset": options.preset,
+        "preset": Path(options.preset).name,
         "seed": config.seed,
         "device": str(device),
         "smoke": dataclasses.asdict(smoke_format),
@@ -230,11 +222,11 @@ def run(
     if checkpoint is None or not checkpoint.training:
         if checkpoint is not None:
             checkpoint.require(session.inputs, folder.checkpoint_path)
-        share = SHARES[options.preset] if options.texture is None else options.texture
-        beginning = pretraining_config(config, share, trainer.picture_cells)
-        if options.begin_with is not None:
-            texture = _given(options.begin_with, config.rule)
-            trainer.begin_with(without_prior_weights(texture, config.rule.conditioning))
+        beginning = pretraining_config(config, trainer.picture_cells)
+        if options.init is not None:
+            wanted = trainer.rule()
+            begun = rule_like(options.init, wanted)
+            trainer.begin_with(without_prior_weights(begun, wanted.config.conditioning))
         elif beginning is not None:
             if checkpoint is None and options.overwrite and options.out is not None:
                 # Resuming must not take the texture of the run that was there for this one's.
@@ -262,23 +254,6 @@ def training_inputs(
     if smoke.velocity is not None:
         frame.append(smoke.velocity)
     return fingerprints(style, config, network, frame=frame)
-
-
-def _given(path: Path, wanted: RuleConfig) -> Rule:
-    """The texture to begin with that was named.
-
-    Raises:
-        VncaError: If it cannot be read, or is a rule of another shape.
-    """
-    rule = Model.load(path).rule
-    for name in SHAPE:
-        its, ours = (getattr(config, name) for config in (rule.config, wanted))
-        if its != ours:
-            raise OptionError(
-                f"`begin_with` {path}: was trained with `{name}` {its:g}; add that, in place of "
-                f"{ours:g}"
-            )
-    return rule
 
 
 def _texture(

@@ -6,7 +6,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
@@ -19,6 +19,7 @@ from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import OnError
 from vnca.painting.roll import Painting
 from vnca.painting.roll import stylize as stylize_volumes
+from vnca.painting.still import StillSmoke
 from vnca.recipe.film import FilmConfig, Shown
 from vnca.recipe.options import changed, distributed
 from vnca.recipe.painting import StylizeRun, read_painted, run, with_scales
@@ -74,7 +75,7 @@ def stylize(
     *,
     out: str | Path | None = None,
     frames: str | None = None,
-    refine: Literal[1, 2, 3, 4] = 1,
+    refine: int = 1,
     colour_grid: str | Sequence[str] = "Cd",
     preview: str | Path | None = None,
     gamma: float | None = None,
@@ -82,6 +83,7 @@ def stylize(
     backend: str = "auto",
     precision: str = "float32",
     resume: bool = False,
+    overwrite: bool = False,
     on_error: OnError = "stop",
     film: FilmConfig | Mapping[str, Any] | None = None,
     watch: Watch = SILENT,
@@ -105,6 +107,8 @@ def stylize(
         backend: What computes the automaton.
         precision: What the native kernel rounds the factors of its products to.
         resume: Go on with a painting in `out` that was ended early.
+        overwrite: Replace painted frames that `out` holds; with `resume`, where those are of
+            another painting.
         on_error: With a file that cannot be read: `stop`, `skip` it, or `hold` the frame before.
         film: How the preview is filmed: a `FilmConfig`, or some of its fields.
         watch: Is told how far it has come, and may cancel.
@@ -134,6 +138,7 @@ def stylize(
         backend=backend,
         precision=precision,
         resume=resume,
+        overwrite=overwrite,
         on_error=on_error,
         smoke=smoke,
         config=config,
@@ -143,7 +148,7 @@ def stylize(
         if not isinstance(sequence, (str, Path)):
             raise OptionError("`out`: volumes have no files to be painted beside; leave it out")
         return _from_files(asked, run(asked, watch, model))
-    for option in ("preview", "resume"):
+    for option in ("preview", "resume", "overwrite"):
         if getattr(asked, option):
             raise OptionError(f"`{option}`: needs a folder for the painting as `out`")
     if isinstance(sequence, (str, Path)):
@@ -172,10 +177,12 @@ def _in_memory(
         smoke = with_fitted_scale(options.smoke, sequence)
         region = sequence_region(sequence, smoke, watch)
         require_dense_enough(sequence, smoke, rule.scales.density)
-        count, read = len(sequence), volumes(sequence, smoke, region.lattice)
+        still = StillSmoke(rule, smoke, watch.note)
+        count, read = len(sequence), volumes(sequence, smoke, region.lattice, still)
     else:
         laid, region = region_of(given)
-        count, read = len(laid), iter(laid)
+        still = StillSmoke(rule, options.smoke, watch.note)
+        count, read = len(laid), still.watched(laid, [None] * len(laid))
     rule = placed(rule, region, watch)
     paintings = stylize_volumes(
         read,

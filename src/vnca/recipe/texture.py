@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import torch
 
@@ -13,7 +13,7 @@ from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.picture import read_style, style_array
 from vnca.io.smoke_format import UpAxis
 from vnca.painting.block import KIND
-from vnca.recipe.options import distributed, named
+from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY
 from vnca.recipe.session import (
     ResumeOptions,
@@ -23,18 +23,20 @@ from vnca.recipe.session import (
     choose_device,
     fitting,
     interrupted,
+    rule_like,
     run_folder,
     shown_and_judged,
 )
 from vnca.rule.model import Model
 from vnca.training.checkpoint import Checkpoint, fingerprints
 from vnca.training.memory import memory_budget
-from vnca.training.texture_config import PRESETS, TextureConfig
+from vnca.training.presets import DEFAULT
+from vnca.training.presets import preset as preset_of
+from vnca.training.pretraining import without_prior_weights
+from vnca.training.texture_config import TextureConfig
 from vnca.training.texture_trainer import texture_trainer
 
 COMMAND = "texture train"
-
-Preset = Literal["draft", "standard"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,8 +49,10 @@ class TextureRun(TrainingOptions):
     """Look at this mesh too while training: GLB, OBJ, PLY or STL."""
     up_axis: UpAxis | None = None
     """The mesh's up axis; y for OBJ and GLB, z for PLY and STL unless given."""
-    preset: Preset = "draft"
-    """Values of all hyperparameters that are not given."""
+    preset: str = DEFAULT
+    """Values of all hyperparameters that are not given: draft, standard, or a TOML file."""
+    init: Path | None = None
+    """A rule of another picture to start from, which takes a part of the iterations."""
     config: TextureConfig = field(default_factory=TextureConfig)
     """Hyperparameters."""
 
@@ -69,7 +73,8 @@ def texture(
     out: str | Path | None = None,
     mesh: str | Path | None = None,
     up_axis: UpAxis | None = None,
-    preset: Preset = "draft",
+    preset: str | Path = DEFAULT,
+    init: str | Path | None = None,
     overwrite: bool = False,
     preview_every: int = 50,
     device: str = "auto",
@@ -85,7 +90,8 @@ def texture(
             given.
         mesh: A mesh file to look at, too, while training.
         up_axis: The mesh's; y for OBJ and GLB, z for PLY and STL unless given.
-        preset: `draft` takes minutes, `standard` hours.
+        preset: `draft` takes minutes, `standard` hours; or the path of a TOML file.
+        init: A model of another picture to start from, which takes a part of the iterations.
         overwrite: Replace the run that `out` holds.
         preview_every: Iterations between preview pictures.
         device: `auto`, `cpu` or `cuda`.
@@ -97,14 +103,15 @@ def texture(
         VncaError: If an input cannot be used, the folder cannot be written, training diverges, or
             memory runs out.
     """
-    (config,) = distributed(options, named(preset, PRESETS, "preset"))
+    (config,) = distributed(options, preset_of(TextureConfig, preset))
     is_file = isinstance(style, (str, Path))
     asked = TextureRun(
         style=Path(style) if is_file else IN_MEMORY,
         out=None if out is None else Path(out),
         mesh=None if mesh is None else Path(mesh),
         up_axis=up_axis,
-        preset=preset,
+        preset=str(preset),
+        init=None if init is None else Path(init),
         overwrite=overwrite,
         preview_every=preview_every,
         device=device,
@@ -145,11 +152,16 @@ def run(
         trainer = texture_trainer(
             style, config, network, mesh=mesh, device=device, memory_budget=budget
         )
+    if options.init is not None and checkpoint is None:
+        wanted = trainer.rule()
+        begun = rule_like(options.init, wanted)
+        trainer.begin_with(without_prior_weights(begun, wanted.config.conditioning))
     training = {
         "kind": KIND,
         "style": options.style.name,
         "mesh": options.mesh.name if options.mesh else None,
-        "preset": options.preset,
+        "init": options.init.name if options.init else None,
+        "preset": Path(options.preset).name,
         "block": config.block,
         "seed": config.seed,
         "device": str(device),

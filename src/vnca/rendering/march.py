@@ -50,7 +50,7 @@ def march(
     *,
     near: float,
     step: float,
-    offset: float,
+    offset: float | Tensor,
 ) -> Iterator[Samples]:
     """Find the samples with smoke within a cell of them, for a group of rays at a time.
 
@@ -64,7 +64,7 @@ def march(
         directions: `[rays, 3]`, cells for each length of depth, of any length.
         near: Depth before which nothing is sampled.
         step: Depth between samples.
-        offset: Where the samples begin, in steps, in [0, 1).
+        offset: Where the samples begin, in steps, in [0, 1); of all rays, or `[rays]` of each.
     """
     smoke = density > 0
     if not smoke.any():
@@ -81,7 +81,7 @@ def march(
     for rays in hit.split(max(1, SAMPLES_AT_ONCE // longest)):
         origin, direction = origins[rays, None], directions[rays, None]
         k = first[rays, None] + torch.arange(longest, device=density.device)
-        depth = (k + offset) * step
+        depth = (k + (offset[rays, None] if isinstance(offset, Tensor) else offset)) * step
         points = torch.addcmul(origin, depth[..., None], direction)
         inside = k < (first + count)[rays, None]
         row, column = torch.nonzero(inside & _look_up(reach, points), as_tuple=True)

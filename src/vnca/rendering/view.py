@@ -1,9 +1,9 @@
 """A picture of a coloured volume, differentiable in its density and colour."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -14,11 +14,22 @@ from vnca.core.camera import Camera
 from vnca.core.errors import OptionError, ShapeError
 from vnca.core.typing import AnyArray
 from vnca.rendering.composite import gather, ray_weights
-from vnca.rendering.march import march
+from vnca.rendering.march import Samples, march
 from vnca.rendering.paper import paper_weights
 from vnca.rendering.sample import sample
 
 Mode = Literal["emission-absorption", "paper"]
+
+Shader = Callable[[Tensor], tuple[Tensor, Tensor]]
+"""What smoke is at points `[m, 3]` in cells: factors of its density `[m]`, at least
+`LEAST_FACTOR`, and linear RGB `[m, 3]`."""
+
+LEAST_FACTOR = 0.5
+"""The least that a shader may multiply density by."""
+# What gets less light through than this is not shaded: an eighth of a step of 8-bit colour.
+_UNSEEN = 5e-4
+# Where the samples of a pixel begin, in steps: each finer grid fills the gaps of the one before.
+_STAGGER = 0.618034
 
 # Density this thin is invisible; below it a colour is no longer divided out.
 _THINNEST = 1e-12
@@ -52,7 +63,7 @@ class View:
 
 def render(
     density: Float[Tensor, "x y z"],
-    colour: Float[Tensor, "x y z 3"],
+    colour: Float[Tensor, "x y z 3"] | Shader,
     camera: Camera,
     *,
     rows: int,
@@ -62,21 +73,24 @@ def render(
     offset: float = 0.0,
     mode: Mode = "emission-absorption",
     cells_to_world: AnyArray | None = None,
+    supersampling: int = 1,
 ) -> View:
     """Render smoke by emission and absorption.
 
     Differentiable in `density` and `colour`, except for cells further than a cell from any
     smoke: rays are not sampled there. Deterministic bit for bit on the CPU.
 
-    Density and density times colour are interpolated, and the colour of a sample is their
-    quotient: so what colour the empty cells around the smoke have is of no effect.
+    Colours of an array: density and density times colour are interpolated, and the colour of a
+    sample is their quotient: so what colour the empty cells around the smoke have is of no effect.
+    A shader says what is at each sample that can be seen, however fine; the density is then that
+    of the smoke before it is painted.
 
     Lengths are those of the space the camera is in, whatever the shape of the cells: what a slab
     of smoke absorbs depends on how thick it is there, not on how many cells it is divided into.
 
     Args:
         density: max(d (1 + Δd), 0), non-negative.
-        colour: Linear RGB.
+        colour: Linear RGB, or a shader.
         camera: Where to look from, in the space that `cells_to_world` leads to.
         rows: Height of the picture, pixels.
         columns: Width of the picture, pixels.
@@ -87,22 +101,100 @@ def render(
         cells_to_world: 4×4, affine and invertible, from cell coordinates of these arrays (cell
             `[i, j, k]` at (i, j, k)) to where the camera is. The same unless given: lengths are
             then in cells.
+        supersampling: Rays along the rows and the columns of a pixel, whose samples begin at
+            different depths; the view is their mean.
 
     Raises:
         ShapeError: If density and colour do not cover the same cells.
         OptionError: If an option is out of range.
     """
     _check(density, colour, rows, columns, gamma, step, offset, mode)
+    if supersampling > 1:
+        return _supersampled(
+            density,
+            colour,
+            camera,
+            supersampling,
+            rows=rows,
+            columns=columns,
+            gamma=gamma,
+            step=step,
+            offset=offset,
+            mode=mode,
+            cells_to_world=cells_to_world,
+        )
+    return _render(
+        density,
+        colour,
+        camera,
+        rows=rows,
+        columns=columns,
+        gamma=gamma,
+        step=step,
+        offset=offset,
+        mode=mode,
+        cells_to_world=cells_to_world,
+    )
+
+
+def _supersampled(
+    density: Tensor, colour: Tensor | Shader, camera: Camera, along: int, **options: Any
+) -> View:
+    """The mean of the rays of each pixel."""
+    rows, columns = options.pop("rows"), options.pop("columns")
+    offset = density.new_tensor(options.pop("offset"))
+    stagger = torch.arange(along**2, device=density.device) * _STAGGER
+    offsets = ((offset + stagger) % 1).view(along, along).repeat(rows, columns).view(-1)
+    view = _render(
+        density,
+        colour,
+        camera,
+        rows=along * rows,
+        columns=along * columns,
+        offset=offsets,
+        **options,
+    )
+
+    def mean(values: Tensor) -> Tensor:
+        shape = (rows, along, columns, along, *values.shape[2:])
+        return values.view(shape).mean((1, 3))
+
+    opacity = mean(view.opacity)
+    depth = mean(torch.where(view.opacity > 0, view.depth * view.opacity, 0))
+    depth = torch.where(opacity > _THINNEST, depth / opacity.clamp_min(_THINNEST), math.inf)
+    return View(mean(view.colour), opacity, depth)
+
+
+def _render(
+    density: Tensor,
+    colour: Tensor | Shader,
+    camera: Camera,
+    *,
+    rows: int,
+    columns: int,
+    gamma: float,
+    step: float,
+    offset: float | Tensor,
+    mode: Mode,
+    cells_to_world: AnyArray | None,
+) -> View:
+    """A ray through the middle of each pixel; `offset` of all, or of each of them."""
     origins, directions = (
         density.new_tensor(array).view(-1, 3)
         for array in _through_cells(*camera.rays(rows, columns), cells_to_world)
     )
-    field = torch.cat([density[..., None], density[..., None] * colour], dim=-1)
+    if isinstance(colour, Tensor):
+        field = torch.cat([density[..., None], density[..., None] * colour], dim=-1)
+    else:
+        field = density[..., None]
     pixels, colours, opacities, depths = [], [], [], []
     for samples in march(density, origins, directions, near=camera.near, step=step, offset=offset):
-        values = samples.table(sample(field, samples.points))
-        thickness = values[..., 0]
-        hue = values[..., 1:] / thickness[..., None].clamp_min(_THINNEST)
+        if isinstance(colour, Tensor):
+            values = samples.table(sample(field, samples.points))
+            thickness = values[..., 0]
+            hue = values[..., 1:] / thickness[..., None].clamp_min(_THINNEST)
+        else:
+            thickness, hue = _shaded(field, colour, samples, gamma * step)
         if mode == "paper":
             weights, transmittance = paper_weights(thickness, gamma=gamma)
         else:
@@ -116,6 +208,31 @@ def render(
         _picture(pixels, opacities, density.new_zeros(rows * columns)).view(rows, columns),
         _picture(pixels, depths, density.new_full((rows * columns,), math.inf)).view(rows, columns),
     )
+
+
+def _shaded(
+    density: Tensor, shader: Shader, samples: Samples, extinction: float
+) -> tuple[Tensor, Tensor]:
+    """Density `[rays, samples]` and colour `[rays, samples, 3]` of what can be seen.
+
+    Density that nothing behind it could be seen through is left as it is.
+
+    Args:
+        density: `[x, y, z, 1]`.
+        shader: What there is at a point.
+        samples: Where to look.
+        extinction: Of density one, in a step.
+    """
+    plain = sample(density, samples.points)
+    with torch.no_grad():
+        least = samples.table(plain)[..., 0] * (extinction * LEAST_FACTOR)
+        reached = torch.cumsum(least, 1) - least
+        seen = ((reached < -math.log(_UNSEEN)) & (least > 0))[samples.row, samples.column]
+    factors, hues = shader(samples.points[seen])
+    values = torch.cat([plain, plain.new_zeros(len(plain), 3)], -1)
+    painted = torch.cat([plain[seen] * factors[:, None], hues], -1)
+    table = samples.table(values.index_put((seen,), painted))
+    return table[..., 0], table[..., 1:]
 
 
 def _through_cells(
@@ -143,7 +260,7 @@ def _picture(pixels: list[Tensor], values: list[Tensor], empty: Tensor) -> Tenso
 
 def _check(
     density: Tensor,
-    colour: Tensor,
+    colour: Tensor | Shader,
     rows: int,
     columns: int,
     gamma: float,
@@ -151,10 +268,11 @@ def _check(
     offset: float,
     mode: str,
 ) -> None:
-    if density.ndim != 3 or colour.shape != (*density.shape, 3):
+    shape = colour.shape if isinstance(colour, Tensor) else (*density.shape, 3)
+    if density.ndim != 3 or shape != (*density.shape, 3):
         raise ShapeError(
             "volume to render: expected density [x, y, z] and colour [x, y, z, 3], "
-            f"got {tuple(density.shape)} and {tuple(colour.shape)}"
+            f"got {tuple(density.shape)} and {tuple(shape)}"
         )
     if min(rows, columns) < 1:
         raise OptionError(f"picture size: expected at least 1×1 pixels, got {columns}×{rows}")

@@ -12,6 +12,8 @@ UNITS = 32
 FREQUENCY = 10.0
 """What a sine layer's weights are multiplied by before training; the rate at which those of the
 sine layers learn is to be multiplied by it, too."""
+COLOURS = 3
+"""Of the outputs; what follows is Δd."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +67,28 @@ class Decoder:
         random = np.random.default_rng(seed)
         shapes = Weights.shapes(channels, units)
         drawn = (random.uniform(-b, b, s) for b, s in zip(bounds, shapes, strict=True))
-        return cls(Weights(*(array.astype(np.float32) for array in drawn)))
+        weights = Weights(*(array.astype(np.float32) for array in drawn))
+        weights.output[COLOURS:] = 0  # the density is left as it is until it is trained
+        return cls(weights)
+
+    @staticmethod
+    def rates(frequency: float = FREQUENCY) -> Weights:
+        """What the learning rate is multiplied by for each of the weights, floats.
+
+        Reference: `engine/DECODE.md`, "There is no ω here".
+        """
+        sine, linear = (frequency, frequency), (1.0, 1.0)
+        return Weights(*sine, *sine, *sine, *linear)
 
     @property
     def channels(self) -> int:
         """Of the states that it sees."""
         return self.weights.first.shape[1]
+
+    @property
+    def units(self) -> int:
+        """Of each of its layers."""
+        return self.weights.first.shape[0]
 
     @property
     def weight_count(self) -> int:

@@ -34,6 +34,9 @@ class Between:
 
     A rule without a decoder shows its states interpolated. What is seen are the first four channels
     of a state, for `colours` and `density_factors`.
+
+    Attributes:
+        has_decoder: Whether the rule has one.
     """
 
     def __init__(self, rule: Rule, backend: str = "auto", *, threads: int | None = None) -> None:
@@ -41,14 +44,15 @@ class Between:
 
         Args:
             rule: Whose states are seen.
-            backend: `auto`, `native` or `reference`.
+            backend: As of the automaton's; those that compute on tensors decode on arrays.
             threads: How many the native kernel uses; by default one for each core.
 
         Raises:
             BackendUnavailableError: If the backend asked for cannot run here.
         """
         decode = array_decode(backend, threads=threads)
-        weights = rule.decoder and rule.decoder.weights
+        weights = rule.decoder.weights if rule.decoder is not None else None
+        self.has_decoder = weights is not None
         if weights is None:
             decode = array_reference
         self._at = partial(decode.decode, weights=weights)

@@ -1,15 +1,13 @@
-"""What training takes whatever it trains on: the hyperparameters of its course."""
+"""What training takes whatever it trains on: the hyperparameters that all trainings share."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from math import inf
-from typing import Annotated
-
-import tyro
 
 from vnca.core.errors import OptionError
 from vnca.engine.session import Compute
 from vnca.losses.appearance import AppearanceConfig
+from vnca.rule.decoder import Decoder
 from vnca.rule.rule import RuleConfig
 
 
@@ -48,9 +46,15 @@ class Pictures:
 class TrainingConfig(ABC):
     """How a rule is trained, on whatever it is trained."""
 
-    rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = field(default_factory=RuleConfig)
+    rule: RuleConfig = field(default_factory=RuleConfig)
+    """The shape of the rule."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
+    """What is compared with the picture."""
     pool: PoolConfig = field(default_factory=PoolConfig)
+    """The states that rollouts start from."""
+    decoder: int = 32
+    """Units in each layer of the decoder, which draws between cells what is finer than they are;
+    0 for none: cells are then interpolated."""
     iterations: int = 400
     """Iterations of training."""
     learning_rate: float = 3e-3
@@ -78,6 +82,8 @@ class TrainingConfig(ABC):
 
     def __post_init__(self) -> None:
         Compute(self.backend)
+        if not 0 <= self.decoder <= 128:
+            raise OptionError(f"`decoder` {self.decoder}: must be from 0 to 128 units")
         if self.iterations < 1:
             raise OptionError(f"`iterations` {self.iterations}: at least 1 is needed")
         if not (0 < self.learning_rate < inf and 0 < self.decay < inf):
@@ -103,6 +109,12 @@ class TrainingConfig(ABC):
     @abstractmethod
     def pictures(self) -> Pictures:
         """What is looked at in an iteration."""
+
+    def initial_decoder(self) -> Decoder | None:
+        """The decoder before training, if there is to be one."""
+        if self.decoder == 0:
+            return None
+        return Decoder.initial(self.rule.channels, seed=self.seed, units=self.decoder)
 
     def rate(self, iteration: int) -> float:
         """Learning rate of an iteration, counted from 0: a ramp, then a step at each milestone."""

@@ -29,10 +29,16 @@ class Descent:
         rollbacks: How often it went back.
     """
 
-    def __init__(self, weights: Sequence[Tensor]) -> None:
-        """Prepare to change `weights`, in place."""
+    def __init__(self, weights: Sequence[Tensor], rates: Sequence[float] | None = None) -> None:
+        """Prepare to change `weights`, in place.
+
+        Args:
+            weights: The leaves of the graph.
+            rates: What the learning rate is multiplied by for each; 1 unless given.
+        """
         self._weights = list(weights)
-        self._adam = torch.optim.Adam(self._weights)
+        self._rates = [1.0] * len(self._weights) if rates is None else list(rates)
+        self._adam = torch.optim.Adam([{"params": [weight]} for weight in self._weights])
         self._explosions = 0  # in a row
         self._kept = self._now()
         self.kept_at = 0
@@ -84,7 +90,8 @@ class Descent:
             return False
         for gradient, norm in zip(gradients, norms, strict=True):
             gradient /= norm + 1e-8
-        self._adam.param_groups[0]["lr"] = rate
+        for group, factor in zip(self._adam.param_groups, self._rates, strict=True):
+            group["lr"] = rate * factor
         self._adam.step()
         return True
 

@@ -14,10 +14,12 @@ from torch import Tensor
 from vnca.core.errors import DivergenceError
 from vnca.core.typing import FloatArray
 from vnca.engine.automaton import Weights
+from vnca.engine.decode_weights import Weights as Decoded
 from vnca.engine.session import Compute, open_session
 from vnca.features.network import FeatureNetwork
 from vnca.losses.appearance import AppearanceLoss
 from vnca.losses.terms import overflow
+from vnca.rule.decoder import Decoder
 from vnca.rule.rule import DENSITY_CHANGE, Rule
 from vnca.training.config import TrainingConfig
 from vnca.training.descent import MOST_ROLLBACKS, Descent
@@ -97,8 +99,14 @@ class Trainer:
                 for w in (rule.hidden, rule.bias, rule.output)
             )
         )
+        self._decoder = scene.decoder
+        for tensor in self._decoder or ():
+            tensor.requires_grad_()
         if not scene.paints_density:
             self._weights.output.register_hook(_without_density)
+            if self._decoder is not None:
+                self._decoder.output.register_hook(_without_density)
+                self._decoder.output_bias.register_hook(_without_density)
         self.session = open_session(
             replace(rule.automaton(config.seed), weights=self._weights),
             scene.domain,
@@ -113,19 +121,28 @@ class Trainer:
         self._random = np.random.default_rng(config.seed)
         self._generator = torch.Generator().manual_seed(config.seed)
         self._pool = Pool(scene.seed(config.rule.channels), config.pool, self._random)
-        self._descent = Descent(self._weights)
+        self._descent = self._fresh_descent()
         self._steps = 0  # of all rollouts: no two share a mask
         self._before: dict[str, Snapshot] | None = None  # the iteration that is under way
         self.kept_states = states_to_keep(scene, config, memory_budget)
 
     def begin_with(self, rule: Rule) -> None:
         """Take over the weights of a rule of the same shape, before the first iteration."""
+        decoder = rule.decoder.weights if rule.decoder is not None else ()
+        arrays = (rule.hidden, rule.bias, rule.output, *decoder)
         with torch.no_grad():
-            for ours, theirs in zip(
-                self._weights, (rule.hidden, rule.bias, rule.output), strict=True
-            ):
+            for ours, theirs in zip(self._trained, arrays, strict=True):
                 ours.copy_(torch.from_numpy(theirs))
-        self._descent = Descent(self._weights)
+        self._descent = self._fresh_descent()
+
+    @property
+    def _trained(self) -> tuple[Tensor, ...]:
+        """The weights of the automaton, then those of the decoder."""
+        return (*self._weights, *(self._decoder or ()))
+
+    def _fresh_descent(self) -> Descent:
+        rates = Decoder.rates() if self._decoder is not None else ()
+        return Descent(self._trained, [*(1.0 for _ in self._weights), *rates])
 
     @property
     def teaches_motion(self) -> bool:
@@ -274,8 +291,9 @@ class Trainer:
 
     def rule(self) -> Rule:
         """The rule as it is now."""
-        hidden, bias, output = (w.detach().cpu().numpy().copy() for w in self._weights)
-        return replace(self._rule, hidden=hidden, bias=bias, output=output)
+        hidden, bias, output = map(_array, self._weights)
+        decoder = self._decoder and Decoder(Decoded(*map(_array, self._decoder)))
+        return replace(self._rule, hidden=hidden, bias=bias, output=output, decoder=decoder)
 
     @staticmethod
     def _overflow(cells: Tensor) -> Tensor:
@@ -283,8 +301,12 @@ class Trainer:
         return overflow(cells) + overflow(2 * cells[:, : DENSITY_CHANGE + 1])
 
 
+def _array(tensor: Tensor) -> FloatArray:
+    return tensor.detach().cpu().numpy().copy()
+
+
 def _without_density(gradient: Tensor) -> Tensor:
-    """The gradient of W2 that leaves those of its weights that change the density as they are."""
+    """The gradient of what has a row for each output, without that of the density's."""
     gradient = gradient.clone()
     gradient[DENSITY_CHANGE] = 0
     return gradient

@@ -12,29 +12,27 @@ import numpy as np
 
 from vnca.engine.automaton import FILTERS
 from vnca.rule.rule import Rule
+from vnca.training.presets import DEFAULT, preset
 from vnca.training.smoke_config import SmokeConfig
-from vnca.training.texture_config import PRESETS, TextureConfig
+from vnca.training.texture_config import TextureConfig
 
-SHARES = {"draft": 4.0, "standard": 1.0, "paper": 0.0}
-"""Iterations on the texture for each on smoke, by preset."""
 SHAPE = ("channels", "hidden", "update_probability", "sobel_divisor", "laplacian_divisor")
 """In what a rule must be like the texture that it begins with."""
 LARGEST_PICTURE = 128
 """Cells along the shorter side of the picture, at most: its patterns are to fit the block."""
 
 
-def pretraining_config(config: SmokeConfig, share: float, picture: float) -> TextureConfig | None:
+def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | None:
     """How the texture is trained for a training on smoke, or None if it is not to be.
 
     Args:
         config: The training on smoke. The rule is as large, and the picture in cells too.
-        share: Iterations for each of that training.
         picture: Cells along its shorter side, as the smoke is shown it.
     """
-    iterations = round(share * config.iterations)
+    iterations = round(config.texture * config.iterations)
     if iterations == 0:
         return None
-    plain = PRESETS["draft"]
+    plain = preset(TextureConfig, DEFAULT)
     picture = min(picture, LARGEST_PICTURE)
     return dataclasses.replace(
         plain,
@@ -44,8 +42,9 @@ def pretraining_config(config: SmokeConfig, share: float, picture: float) -> Tex
         appearance=dataclasses.replace(
             plain.appearance,
             layers=config.appearance.layers,
-            style_scale=picture / plain.slices.size,
+            style_scale=picture / plain.slice.cells,
         ),
+        decoder=config.decoder,
         iterations=iterations,
         features=config.features,
         backend=config.backend,

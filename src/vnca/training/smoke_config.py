@@ -1,15 +1,12 @@
-"""Every hyperparameter of training on smoke, with its presets."""
+"""Every hyperparameter of training on smoke."""
 
-import dataclasses
 from dataclasses import dataclass, field
 from math import inf
 from typing import Literal
 
 from vnca.core.errors import OptionError
-from vnca.losses.appearance import AppearanceConfig
 from vnca.losses.motion import MotionConfig
-from vnca.rule.rule import RuleConfig
-from vnca.training.config import Pictures, PoolConfig, TrainingConfig
+from vnca.training.config import Pictures, TrainingConfig
 
 
 @dataclass(frozen=True)
@@ -18,6 +15,12 @@ class ViewConfig:
 
     size: int = 128
     """Rows and columns of a view, pixels."""
+    pixels_per_cell: float | None = None
+    """Pixels that show a cell: a view then shows a part of the smoke, from as near as that takes;
+    all of the smoke unless given."""
+    supersampling: int = 2
+    """Rays along the rows and the columns of a pixel, where a decoder draws what is finer than
+    pixels."""
     azimuths: tuple[float, ...] = ()
     """Views come from these degrees around the smoke; from all around unless given."""
     elevation: float = 30.0
@@ -36,6 +39,12 @@ class ViewConfig:
     def __post_init__(self) -> None:
         if self.size < 32:
             raise OptionError(f"`view.size` {self.size}: at least 32 pixels are needed")
+        if self.pixels_per_cell is not None and not 0 < self.pixels_per_cell <= 64:
+            raise OptionError(
+                f"`view.pixels_per_cell` {self.pixels_per_cell:g}: must be above 0, at most 64"
+            )
+        if not 1 <= self.supersampling <= 8:
+            raise OptionError(f"`view.supersampling` {self.supersampling}: must be from 1 to 8")
         if not all(-360 <= azimuth <= 360 for azimuth in self.azimuths):
             raise OptionError(
                 f"`view.azimuths` {' '.join(map(str, self.azimuths))}: must be -360 to 360 degrees"
@@ -55,53 +64,23 @@ class SmokeConfig(TrainingConfig):
     """How a rule is trained on smoke."""
 
     motion: MotionConfig = field(default_factory=MotionConfig)
+    """What the seen motion is compared with."""
     view: ViewConfig = field(default_factory=ViewConfig)
+    """How the smoke is looked at."""
+    texture: float = 0.0
+    """Iterations on a solid texture of the picture for each one on the smoke, made before those:
+    patterns come from there. 0 begins with nothing."""
     winds: bool = False
     """Tell each state of the pool another speed and density of the smoke, and for every other turn
     the velocity and carry all of the smoke along: the rule learns from one frame to paint smoke
     that moves otherwise."""
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.texture <= 1000:
+            raise OptionError(f"`texture` {self.texture:g}: must be from 0 to 1000")
+
     @property
     def pictures(self) -> Pictures:
         """A view in each iteration."""
         return Pictures("view.size", self.view.size, 1)
-
-
-# A cell that knows where it is paints one frame well; one that does not paints any. Strong
-# gradients let patterns hold their shape.
-_ANYWHERE = RuleConfig(sobel_divisor=8, position_prior=False)
-
-# About a pixel a cell: of finer detail comes grain.
-_DRAFT = SmokeConfig(
-    iterations=250,
-    learning_rate=1e-3,
-    view=ViewConfig(size=96),
-    pool=PoolConfig(size=16),
-    rule=_ANYWHERE,
-    appearance=AppearanceConfig(grey=False, samples=512),
-    motion=MotionConfig(weight=0.3),
-)
-
-PRESETS = {
-    "draft": _DRAFT,
-    "standard": dataclasses.replace(
-        _DRAFT,
-        iterations=1000,
-        learning_rate=1.5e-3,
-        rule=dataclasses.replace(_ANYWHERE, hidden=128),
-        winds=True,
-    ),
-    "paper": SmokeConfig(
-        iterations=5000,
-        learning_rate=1e-3,
-        shortest_rollout=32,
-        longest_rollout=96,
-        view=ViewConfig(size=256, elevation=0.0, mode="paper"),
-        pool=PoolConfig(size=256),
-        rule=RuleConfig(hidden=128),
-        appearance=AppearanceConfig(pixels=0.0, style_scale=1.0),
-        features="vgg16",
-    ),
-}
-"""Training on smoke by name, for rules that begin with a texture: `draft` in minutes on two cores,
-`standard` overnight or on a GPU; and `paper`, as the paper describes it, from nothing."""

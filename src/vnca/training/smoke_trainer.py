@@ -44,6 +44,7 @@ def smoke_trainer(
     what = f"frame {smoke.frame}"
     smoke = on_lattice(smoke, Lattice.of(smoke.index_to_world, what), what)
     rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
+    rule = replace(rule, decoder=config.initial_decoder())
     scene = SmokeScene(smoke, rule, config.view, winds=config.winds, device=device)
     rule = replace(rule, place=Region(Lattice(smoke.index_to_world), scene.domain.box))
     motion = None

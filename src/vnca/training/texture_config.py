@@ -1,10 +1,6 @@
-"""Every hyperparameter of training a solid texture, with its presets."""
+"""Every hyperparameter of training a solid texture."""
 
-import dataclasses
 from dataclasses import dataclass, field
-from typing import Annotated
-
-import tyro
 
 from vnca.core.errors import OptionError
 from vnca.losses.appearance import AppearanceConfig
@@ -17,20 +13,31 @@ from vnca.training.config import Pictures, PoolConfig, TrainingConfig
 class SliceConfig:
     """How the block is looked at while training."""
 
-    size: int = 64
-    """Rows and columns of a slice, pixels: cells, but for the zoom."""
-    count: int = 2
+    size: int = 128
+    """Rows and columns of a slice, pixels."""
+    pixels_per_cell: float = 4.0
+    """Pixels that show a cell, but for the zoom."""
+    supersampling: int = 2
+    """Samples along the rows and the columns of a pixel: what is finer than pixels is averaged
+    instead of becoming grain."""
+    count: int = 1
     """Slices in an iteration."""
     oblique: float = 0.5
     """Share of the slices that lie at any angle; the others lie along the axes."""
     zoom: float = 1.1
-    """A pixel shows from 1/zoom to zoom cells."""
+    """A slice shows from 1/zoom to zoom times as much."""
     mesh: float = 0.5
     """Share of the pictures that show the mesh, where there is one."""
 
     def __post_init__(self) -> None:
         if self.size < 32:
             raise OptionError(f"`slice.size` {self.size}: at least 32 pixels are needed")
+        if not 0 < self.pixels_per_cell <= 64:
+            raise OptionError(
+                f"`slice.pixels_per_cell` {self.pixels_per_cell:g}: must be above 0, at most 64"
+            )
+        if not 1 <= self.supersampling <= 8:
+            raise OptionError(f"`slice.supersampling` {self.supersampling}: must be from 1 to 8")
         if self.count < 1:
             raise OptionError(f"`slice.count` {self.count}: at least 1 is needed")
         for name in ("oblique", "mesh"):
@@ -38,6 +45,11 @@ class SliceConfig:
                 raise OptionError(f"`slice.{name}` {getattr(self, name)}: must be from 0 to 1")
         if not 1 <= self.zoom <= 4:
             raise OptionError(f"`slice.zoom` {self.zoom}: must be from 1 to 4")
+
+    @property
+    def cells(self) -> float:
+        """Along the side of a slice."""
+        return self.size / self.pixels_per_cell
 
 
 # A texture is the same everywhere and follows nothing. Only gradients tell a cell where in a
@@ -53,15 +65,19 @@ _COLOURS = AppearanceConfig(grey=False, samples=512)
 class TextureConfig(TrainingConfig):
     """How a rule for a solid texture is trained."""
 
-    rule: Annotated[RuleConfig, tyro.conf.arg(name="")] = _PLAIN
+    rule: RuleConfig = _PLAIN
+    """The shape of the rule."""
     appearance: AppearanceConfig = _COLOURS
+    """What is compared with the picture."""
     pool: PoolConfig = field(default_factory=lambda: PoolConfig(size=16))
+    """The states that rollouts start from."""
     iterations: int = 1500
     """Iterations of training: patterns come late, colours early."""
     learning_rate: float = 2e-3
     """Adam's learning rate at its highest. Nothing from outside holds a texture's states: at the
     rates that suit smoke, many explode."""
-    slices: Annotated[SliceConfig, tyro.conf.arg(name="slice")] = field(default_factory=SliceConfig)
+    slice: SliceConfig = field(default_factory=SliceConfig)
+    """How the block is looked at."""
     block: int = 32
     """Cells along an edge of the block that is trained on; patterns are smaller than it."""
 
@@ -80,19 +96,4 @@ class TextureConfig(TrainingConfig):
     @property
     def pictures(self) -> Pictures:
         """Slices, or views of the mesh."""
-        return Pictures("slice.size", self.slices.size, self.slices.count)
-
-
-PRESETS = {
-    "draft": TextureConfig(),
-    "standard": TextureConfig(
-        rule=dataclasses.replace(_PLAIN, hidden=128),
-        slices=SliceConfig(size=128),
-        pool=PoolConfig(size=64),
-        block=64,
-        iterations=6000,
-        shortest_rollout=12,
-        longest_rollout=48,
-    ),
-}
-"""Training by name: `draft` in minutes on two cores, `standard` in hours or on a GPU."""
+        return Pictures("slice.size", self.slice.size, self.slice.count)

@@ -39,11 +39,15 @@ def texture_trainer(
     Raises:
         OptionError: If the memory budget is not enough.
     """
-    told = config.rule.conditioning_width
-    scene = BlockScene(
-        config.block, config.slices, conditioning_width=told, mesh=mesh, device=device
-    )
     rule = initial_rule(config)
+    scene = BlockScene(
+        config.block,
+        config.slice,
+        conditioning_width=config.rule.conditioning_width,
+        mesh=mesh,
+        decoder=rule.decoder,
+        device=device,
+    )
     return Trainer(scene, rule, style, config, network, memory_budget=memory_budget)
 
 
@@ -57,4 +61,4 @@ def initial_rule(config: TextureConfig) -> Rule:
     bound = config.rule.inputs**-0.5
     random = np.random.default_rng(config.seed)
     bias = random.uniform(-bound, bound, rule.bias.shape).astype(np.float32)
-    return dataclasses.replace(rule, bias=bias)
+    return dataclasses.replace(rule, bias=bias, decoder=config.initial_decoder())

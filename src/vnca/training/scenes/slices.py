@@ -89,6 +89,14 @@ def shown(
     return sample(periodic(block), torch.remainder(points, size).view(-1, 3)).view(points.shape)
 
 
+def averaged(samples: Float[Tensor, "_ _ c"], along: int) -> Float[Tensor, "_ _ c"]:
+    """Pixels of which each is the mean of `along` × `along` samples; differentiable."""
+    if along == 1:
+        return samples
+    rows, columns, channels = samples.shape
+    return samples.view(rows // along, along, columns // along, along, channels).mean((1, 3))
+
+
 def as_picture(colour: Float[Tensor, "r c 3"]) -> Float[Tensor, "1 3 r c"]:
     """Linear RGB as the appearance loss wants it: sRGB, channels first."""
     return linear_to_srgb(colour).permute(2, 0, 1)[None]

@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,11 +20,11 @@ from vnca.losses.terms import luma
 from vnca.rendering.brightness import gamma_for_own_colour
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
 from vnca.rendering.velocity import projected_velocity
-from vnca.rendering.view import View, render
+from vnca.rendering.view import Shader, View, render
 from vnca.rule.conditioning import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
 from vnca.rule.conditioning import normalised_velocity, priors
-from vnca.rule.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, SMOKE_THRESHOLD, Rule
-from vnca.training.scene import Scene
+from vnca.rule.rule import SMOKE_THRESHOLD, Rule
+from vnca.training.scene import Scene, colours, density_factors
 from vnca.training.smoke_config import ViewConfig
 
 SPEEDS = (0.25, 1.5)
@@ -78,7 +79,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
 
         Args:
             smoke: The frame; must hold smoke.
-            rule: Its normalisers and switches are used, not its weights.
+            rule: Its normalisers, switches and decoder are used, not the weights of its automaton.
             view: How it is looked at; gamma is the rule's.
             winds: Whether its velocity, and the density told, are others in each augmented.
             device: Where rollouts and pictures are computed.
@@ -100,14 +101,22 @@ class SmokeScene(Scene[SmokeViewpoint]):
                 box=box,
             )
         width = view_width(self.box, smoke.index_to_world)
-        super().__init__(domain, priors(domain, smoke, rule), device, width=width)
+        if view.pixels_per_cell is not None:
+            width = min(width, view.size / view.pixels_per_cell)
+        super().__init__(
+            domain, priors(domain, smoke, rule), device, width=width, decoder=rule.decoder
+        )
         self._place = _stood(smoke.index_to_world)
         self.samples = max(domain.box.shape) / view.step
         self.gamma = rule.scales.gamma
         self._grey_gamma = self.gamma
         if view.mode != "paper":
             self._grey_gamma = gamma_for_own_colour(smoke.density / rule.scales.density)
+        self._smoke_cells = np.argwhere(smoke.density > SMOKE_THRESHOLD * rule.scales.density)
+        self._smoke_cells += np.subtract(smoke.origin, domain.box.lower)
         density = smoke.density_field.gather(domain.cells) / rule.scales.density
+        centres = (domain.cells - np.asarray(domain.box.lower)).astype(np.float32)
+        self._centres = torch.from_numpy(centres).to(device)
         self._density = torch.from_numpy(density.astype(np.float32)).to(device)
         velocity = np.zeros((len(domain), 3), dtype=np.float32)
         if smoke.velocity_field is not None:
@@ -165,9 +174,19 @@ class SmokeScene(Scene[SmokeViewpoint]):
         azimuth = float(random.choice(azimuths)) if azimuths else random.uniform(0, 360)
         elevation = random.uniform(-self.view.elevation, self.view.elevation)
         camera = _level_turntable(*self._corners, azimuth, elevation)
+        if self.width < camera.height:
+            camera = self._closer(camera, random)
         # Samples at random depths: no pattern can hide between them.
         offset = float(random.uniform()) if self.view.mode == "emission-absorption" else 0.0
         return SmokeViewpoint(camera, offset)
+
+    def _closer(self, camera: Orthographic, random: np.random.Generator) -> Orthographic:
+        """The camera before some cell of the smoke, so near that it sees `width` cells."""
+        cell = self._smoke_cells[int(random.integers(len(self._smoke_cells)))]
+        if self._place is not None:
+            cell = self._place[:3, :3] @ cell + self._place[:3, 3]
+        x, y, z = np.asarray(cell, float).tolist()
+        return dataclasses.replace(camera, target=(x, y, z), height=self.width)
 
     def pictures(
         self, state: Tensor, viewpoint: SmokeViewpoint, background: Tensor
@@ -187,10 +206,15 @@ class SmokeScene(Scene[SmokeViewpoint]):
 
         Reference: VNCA, the equations for I and for L_app.
         """
-        density = self._painted_density(state)
+        if self.decoder is None:
+            density = self._painted_density(state)
+            white: Tensor | Shader = density.new_ones(1).expand(*density.shape, 3)
+        else:
+            density = self.dense(self._density)
+            white = partial(self._shade, state, white=True)
         view = render(
             density,
-            density.new_ones(1).expand(*density.shape, 3),
+            white,
             viewpoint.camera,
             rows=self.view.size,
             columns=self.view.size,
@@ -198,6 +222,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
             offset=viewpoint.offset,
             mode="paper",
             cells_to_world=self._place,
+            supersampling=self._supersampling,
         )
         behind = srgb_to_linear(luma(linear_to_srgb(background).view(1, 3, 1, 1))).view(3)
         return linear_to_srgb(view.over(behind)).permute(2, 0, 1)[None]
@@ -221,10 +246,15 @@ class SmokeScene(Scene[SmokeViewpoint]):
         `view` is that of training unless given; `offset` shifts all samples along their rays.
         """
         view = view or self.view
-        colour = srgb_to_linear((state[:-1, COLOUR] + 0.5).clamp(0, 1))
+        if self.decoder is None:
+            density = self._painted_density(state)
+            colour: Tensor | Shader = self.dense(colours(state[:-1]))
+        else:
+            density = self.dense(self._density)
+            colour = partial(self._shade, state)
         return render(
-            self._painted_density(state),
-            self.dense(colour),
+            density,
+            colour,
             camera,
             rows=view.size,
             columns=view.size,
@@ -233,7 +263,21 @@ class SmokeScene(Scene[SmokeViewpoint]):
             offset=offset,
             mode=view.mode,
             cells_to_world=self._place,
+            supersampling=self._supersampling,
         )
+
+    @property
+    def _supersampling(self) -> int:
+        """Of what is as fine as cells, one ray a pixel shows everything."""
+        return 1 if self.decoder is None else self.view.supersampling
+
+    def _shade(
+        self, state: Tensor, points: Tensor, *, white: bool = False
+    ) -> tuple[Tensor, Tensor]:
+        """What a decoded state shows at points `[m, 3]`, as `vnca.rendering.view.Shader` has it."""
+        seen = self.seen(state, points)
+        hues = seen.new_ones(len(seen), 3) if white else colours(seen)
+        return density_factors(seen), hues
 
     def motion(self, state: Tensor, viewpoint: SmokeViewpoint, size: int) -> tuple[Tensor, Tensor]:
         """How the smoke that `pictures` shows moves: pixels per frame `[r, c, 2]`, and opacity.
@@ -254,8 +298,11 @@ class SmokeScene(Scene[SmokeViewpoint]):
         )
 
     def _painted_density(self, state: Tensor) -> Tensor:
-        change = state[:-1, DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
-        return self.dense(self._density * (1 + change))
+        """The density on the grid; of a decoded state, what is seen in the middle of cells."""
+        cells = state[:-1]
+        if self.decoder is not None:
+            cells = self.seen(state, self._centres)
+        return self.dense(self._density * density_factors(cells))
 
 
 def view_width(box: Box, index_to_world: AnyArray) -> float:

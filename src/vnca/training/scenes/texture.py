@@ -12,13 +12,14 @@ from vnca.core.typing import BoolArray, FloatArray
 from vnca.io.mesh import Mesh
 from vnca.meshes.raster import visible
 from vnca.painting.block import block_domain
-from vnca.rendering.colour import srgb_to_linear
-from vnca.rule.rule import COLOUR, PRIORS
-from vnca.training.scene import Scene
+from vnca.rule.decoder import Decoder
+from vnca.rule.rule import PRIORS
+from vnca.training.scene import Scene, colours
 from vnca.training.scenes.slices import (
     DIAGONAL,
     Angles,
     as_picture,
+    averaged,
     axis_angles,
     oblique_angles,
     shown,
@@ -30,8 +31,10 @@ MESH_VIEWS = 24
 """Views of the mesh that training chooses from."""
 PREVIEW_VIEWS: tuple[Angles, ...] = ((0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (45.0, DIAGONAL))
 """From the front, the right and above, and across a diagonal, which training never does."""
-SPACING = 0.5
-"""Cells a pixel of a preview_view shows."""
+PREVIEW_CELLS = 128
+"""Cells across a preview view of states that are interpolated."""
+DECODED_CELLS = 32
+"""Cells across one of states that are decoded: their strokes are finer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +78,7 @@ class BlockScene(Scene[list[Cut]]):
         *,
         conditioning_width: int = PRIORS,
         mesh: Mesh | None = None,
+        decoder: Decoder | None = None,
         device: torch.device | str = "cpu",
     ) -> None:
         """Prepare a block.
@@ -83,7 +87,8 @@ class BlockScene(Scene[list[Cut]]):
             size: Cells along an edge.
             slices: How it is looked at.
             conditioning_width: Numbers that a cell of the rule is told: all are zero here.
-            mesh: Seen from all sides beside the slices; a pixel shows about a cell.
+            mesh: Seen from all sides beside the slices.
+            decoder: What is seen between cells; they are interpolated unless given.
             device: Where rollouts and pictures are computed.
 
         Raises:
@@ -91,13 +96,17 @@ class BlockScene(Scene[list[Cut]]):
         """
         domain = block_domain(size)
         nothing = np.zeros((len(domain), conditioning_width), np.float32)
-        super().__init__(domain, nothing, device, width=float(slices.size))
+        super().__init__(domain, nothing, device, width=slices.cells, decoder=decoder)
         self.slices = slices
-        self.views = mesh_views(mesh, slices.size) if mesh is not None else []
+        self.views: list[MeshView] = []
+        if mesh is not None:
+            self.views = mesh_views(mesh, slices.size * slices.supersampling, slices.cells)
 
-    def block(self, state: Tensor) -> Tensor:
-        """Linear RGB `[x, y, z, 3]` of a state; differentiable."""
-        return self.dense(srgb_to_linear((state[:-1, COLOUR] + 0.5).clamp(0, 1)))
+    def shown(self, state: Tensor, points: Tensor) -> Tensor:
+        """Linear RGB `[*, 3]` of a state at points `[*, 3]` in cells; differentiable."""
+        if self.decoder is None:
+            return shown(self.dense(colours(state[:-1])), points)
+        return colours(self.seen(state, points.view(-1, 3))).view(points.shape)
 
     def viewpoint(self, random: np.random.Generator) -> list[Cut]:
         """Random slices, or views of the mesh."""
@@ -107,27 +116,30 @@ class BlockScene(Scene[list[Cut]]):
         self, state: Tensor, viewpoint: list[Cut], background: Tensor
     ) -> tuple[Tensor, Tensor]:
         """The slices and views, as `Scene.pictures` has it."""
-        block, size = self.block(state), self.slices.size
-        colours, opacities = [], []
+        size, samples = self.slices.size, self.slices.supersampling
+        pictures, opacities = [], []
         for points, covered in viewpoint:
-            colour, opacity = shown(block, points), block.new_ones(size, size)
+            colour, opacity = self.shown(state, points), state.new_ones(size, size)
             if covered is not None:
-                colour = background.expand(size, size, 3).index_put((covered,), colour)
-                opacity = covered.to(block.dtype)
-            colours.append(as_picture(colour))
+                empty = background.expand(*covered.shape, 3)
+                colour = empty.index_put((covered,), colour)
+                opacity = averaged(covered.to(colour.dtype)[..., None], samples)[..., 0]
+            pictures.append(as_picture(averaged(colour, samples)))
             opacities.append(opacity)
-        return torch.cat(colours), torch.stack(opacities)
+        return torch.cat(pictures), torch.stack(opacities)
 
     def preview_views(self, state: Tensor, size: int) -> list[FloatArray]:
         """Slices from the front, the right and above, and across a diagonal."""
-        block = self.block(state)
-        middle = np.full(3, len(block) / 2)
-        return [
-            shown(block, slice_points(angles, middle, size=size, spacing=SPACING).to(block.device))
-            .cpu()
-            .numpy()
-            for angles in PREVIEW_VIEWS
-        ]
+        cells = PREVIEW_CELLS if self.decoder is None else DECODED_CELLS
+        samples = self.slices.supersampling
+        middle = np.full(3, self.domain.box.shape[0] / 2)
+        views = []
+        for angles in PREVIEW_VIEWS:
+            across = samples * size
+            points = slice_points(angles, middle, size=across, spacing=cells / across)
+            colour = averaged(self.shown(state, points.to(state.device)), samples)
+            views.append(colour.cpu().numpy())
+        return views
 
     def _cut(self, random: np.random.Generator) -> Cut:
         device = self.priors.device
@@ -138,23 +150,24 @@ class BlockScene(Scene[list[Cut]]):
             return Cut(points.to(device), torch.from_numpy(view.covered).to(device))
         oblique = random.uniform() < self.slices.oblique
         angles = oblique_angles(random) if oblique else axis_angles(random)
-        spacing = self.slices.zoom ** random.uniform(-1, 1)
-        points = slice_points(angles, middle, size=self.slices.size, spacing=spacing)
+        across = self.slices.size * self.slices.supersampling
+        spacing = self.slices.cells / across * self.slices.zoom ** random.uniform(-1, 1)
+        points = slice_points(angles, middle, size=across, spacing=spacing)
         return Cut(points.to(device), None)
 
 
-def mesh_views(mesh: Mesh, size: int) -> list[MeshView]:
-    """A mesh from all sides, a cell a pixel: the mesh as large as the picture allows."""
+def mesh_views(mesh: Mesh, size: int, cells: float) -> list[MeshView]:
+    """A mesh from all sides, as large as the picture allows: `size` pixels and `cells` across."""
     low, high = mesh.bounds
     diameter = float(np.linalg.norm(high - low))
     points = np.concatenate([surface.points for surface in mesh.surfaces])
-    points = (points - (low + high) / 2) * (size / diameter)
+    points = (points - (low + high) / 2) * (cells / diameter)
     counts = np.cumsum([0, *(len(surface.points) for surface in mesh.surfaces)])
     faces = np.concatenate([s.faces + n for s, n in zip(mesh.surfaces, counts, strict=False)])
     views, random = [], np.random.default_rng(0)
     for _ in range(MESH_VIEWS):
         angles = random.uniform(0, 360), float(np.degrees(np.arcsin(random.uniform(-1, 1))))
-        camera = Orthographic((0.0, 0.0, 0.0), *angles, height=size)
+        camera = Orthographic((0.0, 0.0, 0.0), *angles, height=cells)
         seen = visible(points, faces, camera, rows=size, columns=size)
         views.append(MeshView(seen.interpolate(points, faces).astype(np.float32), seen.covered))
     return views

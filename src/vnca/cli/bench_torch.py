@@ -1,33 +1,91 @@
-"""`vnca bench train`."""
+"""`vnca bench step` and `vnca bench train`, which need torch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Annotated, Literal
 
 import torch
-import tyro
 
 from vnca.bench.contenders import available, require
 from vnca.bench.measurement import run_facts
+from vnca.bench.step import TOLERANCES, StepConfig, StepRun, measure_steps, prepare
 from vnca.bench.train import Training, measure_training
-from vnca.cli.bench_options import Rows, Tables, parse_bench, short
+from vnca.cli.bench import Rows, Tables, parse_bench, short
 from vnca.cli.demo import STYLE
-from vnca.cli.options import say
-from vnca.cli.watch import Terminal
+from vnca.cli.terminal import Terminal, say
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.native.step import default_threads
 from vnca.features.load import load_network
 from vnca.io.picture import read_style
-from vnca.io.smoke import SmokeFormat
+from vnca.io.smoke import SmokeFormat, missing_velocity
+from vnca.io.smoke_format import NO_VELOCITY
 from vnca.recipe.sequence import beside, read_alone
 from vnca.recipe.session import choose_device
 from vnca.simulation import simulate
 from vnca.training.memory import memory_budget
-from vnca.training.smoke_config import PRESETS, SmokeConfig
+from vnca.training.presets import DEFAULT, preset
+from vnca.training.smoke_config import SmokeConfig
+
+
+@dataclass(frozen=True)
+class Step(Tables):
+    """Time one step of the automaton in every backend, in turns, in one run.
+
+    Times are per active cell. GFLOP/s count the matrix products that are needed, the same for
+    every backend. If backends disagree with the reference in float64, nothing is timed.
+    """
+
+    config: StepConfig = field(default_factory=StepConfig)
+    """What is measured."""
+
+
+def run_step(arguments: Sequence[str]) -> None:
+    """Measure as asked, print what was found and keep it.
+
+    Raises:
+        VncaError: If something cannot be measured or written, or backends disagree.
+    """
+    options = parse_bench("step", Step, arguments)
+    options.require_writable()
+    facts = prepare(options.config)
+    options.print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
+    rows = []
+    for run in measure_steps(options.config):
+        options.print("\n".join(_step_table(run)))
+        rows += run.rows
+    peaks = {name: rows[0][name] for name in ("gemm_gflops", "copy_gbs")}
+    options.keep(facts, rows, peaks)
+
+
+def _step_table(run: StepRun) -> list[str]:
+    first, plain = run.rows[0], {r["pass"]: r for r in run.rows if r["backend"] == "plain"}
+    to_state, to_gradients = TOLERANCES[run.dtype]
+    lines = [
+        "",
+        f"{run.dtype}, {first['grid']} cells, {first['occupancy']:.1%} active, hidden "
+        f"{first['hidden']}",
+        f"peaks: GEMM {run.gemm_gflops:.1f} GFLOP/s, copy {run.copy_gbs:.1f} GB/s",
+        f"all agree with the reference in float64: states to {to_state:.0e}, gradients to "
+        f"{to_gradients:.0e} of their norm",
+        f"{'backend':10}{'pass':9}{'ns a cell (min to max)':>32}{'GFLOP/s':>10}{'of GEMM':>9}"
+        f"{'of copy':>9}{'MB':>9}{'against plain':>15}",
+    ]
+    for row in run.rows:
+        took = short(row["ns_per_cell"])
+        spread = f"({short(row['ns_per_cell_min'])} to {short(row['ns_per_cell_max'])})"
+        gain = ""
+        if row["pass"] in plain:
+            gain = f"{plain[row['pass']]['ns_per_cell'] / row['ns_per_cell']:.1f}×"
+        lines.append(
+            f"{row['backend']:10}{row['pass']:9}{took:>10} {spread:>21}"
+            f"{row['gflops']:>10.1f}{row['share_of_gemm']:>9.1%}{row['share_of_copy']:>9.1%}"
+            f"{short(row['peak_mb']):>9}{gain:>15}"
+        )
+    return lines
+
 
 _FRAME = 30
 """Of the simulated plume: it has risen through most of its box."""
@@ -47,8 +105,8 @@ class BenchTrain(Tables):
     """A picture; one of the package unless given."""
     resolution: int = 48
     """Cells across the simulated plume."""
-    preset: Literal["draft", "standard", "paper"] = "draft"
-    """Sizes of what is trained."""
+    preset: str = DEFAULT
+    """Sizes of what is trained: draft, standard, paper, or a TOML file."""
     hidden: int | None = None
     """Hidden units; the preset's unless given."""
     rollout: int | None = None
@@ -65,7 +123,7 @@ class BenchTrain(Tables):
     """Of the CPU; as many as it has cores unless given."""
     repeats: int = 5
     """Iterations that are timed."""
-    smoke: Annotated[SmokeFormat, tyro.conf.arg(name="")] = field(default_factory=SmokeFormat)
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
 
     def __post_init__(self) -> None:
@@ -78,28 +136,24 @@ class BenchTrain(Tables):
     @property
     def config(self) -> SmokeConfig:
         """The hyperparameters."""
-        preset = PRESETS[self.preset]
-        rollout = self.rollout or (preset.shortest_rollout + preset.longest_rollout) // 2
+        plan = preset(SmokeConfig, self.preset)
+        rollout = self.rollout or (plan.shortest_rollout + plan.longest_rollout) // 2
         return replace(
-            preset,
-            rule=replace(preset.rule, hidden=self.hidden or preset.rule.hidden),
-            view=replace(preset.view, size=self.view_size or preset.view.size),
+            plan,
+            rule=replace(plan.rule, hidden=self.hidden or plan.rule.hidden),
+            view=replace(plan.view, size=self.view_size or plan.view.size),
             shortest_rollout=rollout,
             longest_rollout=rollout,
         )
 
 
-def run(arguments: Sequence[str]) -> None:
-    """Read the options and measure."""
-    bench_train(parse_bench("train", BenchTrain, arguments))
-
-
-def bench_train(options: BenchTrain) -> None:
+def run_train(arguments: Sequence[str]) -> None:
     """Measure as asked, print what was found and keep it.
 
     Raises:
         VncaError: If something cannot be measured or written, or backends disagree.
     """
+    options = parse_bench("train", BenchTrain, arguments)
     options.require_writable()
     device, config = choose_device(options.device), options.config
     for name in options.backends:
@@ -116,13 +170,16 @@ def bench_train(options: BenchTrain) -> None:
     )
     rows = [{**row, "preset": options.preset} for row in rows]
     options.print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
-    options.print("\n".join(_table(rows)))
+    options.print("\n".join(_training_table(rows)))
     options.keep(facts, rows)
 
 
 def _smoke(options: BenchTrain) -> Volume:
     if options.frame is not None:
-        return read_alone(options.frame, beside(options.frame, options.smoke), Terminal())
+        frame = read_alone(options.frame, beside(options.frame, options.smoke), Terminal())
+        if frame.velocity_field is None and options.smoke.velocity_grid != NO_VELOCITY:
+            Terminal().note(f"{missing_velocity(options.frame)}; teaching motion is not timed")
+        return frame
     say("simulating a plume")
     *_, frame = simulate("plume", resolution=options.resolution, frames=_FRAME, seed=0)
     return frame
@@ -133,7 +190,7 @@ def _style(options: BenchTrain) -> FloatArray:
         return read_style(options.style or own)
 
 
-def _table(rows: Rows) -> list[str]:
+def _training_table(rows: Rows) -> list[str]:
     first = rows[0]
     lines = [
         f"{first['preset']}: {first['cells']} active cells in {first['grid']}, hidden "

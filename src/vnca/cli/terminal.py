@@ -1,14 +1,19 @@
-"""Progress of long work and what came of it: in words for people, as JSON for programs."""
+"""What long work tells on the terminal, in words or as JSON, and how it is told to end."""
 
 import io
 import json
 import re
+import signal
 import sys
+import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
 from typing import Any, TextIO, TypeVar
+
+from vnca.cli.help import as_option
+from vnca.core.errors import Terminated
 
 T = TypeVar("T")
 _ARGUMENT = re.compile(r"`([a-z_]+(?:\.[a-z_]+)*)`")
@@ -85,7 +90,7 @@ def made(what: str, path: Path) -> None:
 
 def as_options(text: str) -> str:
     """What the library says of arguments, such as `view.size`, in the words of the command line."""
-    return _ARGUMENT.sub(lambda found: "--" + found[1].replace("_", "-"), text)
+    return _ARGUMENT.sub(lambda found: as_option(found[1]), text)
 
 
 def end_line() -> None:
@@ -169,3 +174,84 @@ def _clock(seconds: float) -> str:
     minutes, seconds = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
+
+
+def say(line: str) -> None:
+    """Tell the user something that is not the result: on standard error, on a line of its own."""
+    end_line()
+    print(as_options(line), file=sys.stderr, flush=True)
+
+
+class Terminal:
+    """A `Watch` that draws a line of progress on standard error."""
+
+    def __init__(self, check: Callable[[], None] = lambda: None) -> None:
+        """Draw nothing yet; `check` is called after each unit of work, and may raise."""
+        self._check = check
+        self._work: tuple[str, int] | None = None
+        self._line: Progress | None = None
+
+    def progress(self, what: str, done: int, total: int, unit: str, note: str = "") -> None:
+        """Draw how far the work has come, and the time that is left."""
+        if self._line is None or self._work != (what, total):
+            self._work = what, total
+            self._line = Progress(what, total, unit, already=done)
+        else:
+            self._line.show(done, note)
+        if done == total:
+            end_line()
+            self._line = None
+        self._check()
+
+    def note(self, line: str) -> None:
+        """Print the line."""
+        say(line)
+
+    def made(self, what: str, path: Path) -> None:
+        """Print where a result is."""
+        made(what, path)
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """SIGTERM raises `Terminated` in the main thread wherever that is, as Ctrl-C does its own."""
+
+    def terminate(*_: Any) -> None:
+        raise Terminated
+
+    with _handling(terminate):
+        yield
+
+
+@contextmanager
+def finishing() -> Iterator[Callable[[], None]]:
+    """SIGTERM waits for a piece of work: the function given is called where one is finished.
+
+    It raises `Terminated` if there was a SIGTERM. A second SIGTERM does not wait.
+    """
+    is_asked = False
+
+    def ask(*_: Any) -> None:
+        nonlocal is_asked
+        if is_asked:
+            raise Terminated
+        is_asked = True
+
+    def stop_if_asked() -> None:
+        if is_asked:
+            raise Terminated
+
+    with _handling(ask):
+        yield stop_if_asked
+
+
+@contextmanager
+def _handling(handler: Callable[..., None]) -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Signals are the main thread's.
+        return
+    before = signal.signal(signal.SIGTERM, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

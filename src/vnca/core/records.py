@@ -1,0 +1,158 @@
+"""Dataclasses with some of their fields given by name: by keywords of Python, or by a file."""
+
+import ast
+import dataclasses
+import inspect
+import textwrap
+from collections.abc import Mapping
+from contextlib import suppress
+from difflib import get_close_matches
+from numbers import Integral, Real
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from vnca.core.errors import OptionError
+
+T = TypeVar("T")
+_WANTED: dict[Any, str] = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    Path: "a path",
+    NoneType: "none",
+}
+
+
+def with_values(default: T, given: Mapping[str, Any], outer: str = "") -> T:
+    """A dataclass with some of its fields replaced, each by a value of the type of the field.
+
+    A field that is a dataclass itself takes an instance, or a mapping of its own fields. Whole
+    numbers are taken for numbers, lists for tuples.
+
+    Args:
+        default: An instance.
+        given: New values by the name of the field.
+        outer: What stands before their names in errors, such as `view.`.
+
+    Raises:
+        OptionError: If there is no field of a name, or a value is of another type or refused.
+    """
+    kind = type(default)
+    hints = get_type_hints(kind)
+    require_known(given, hints.keys(), outer)
+    changed = {}
+    for name, value in given.items():
+        before = getattr(default, name)
+        if dataclasses.is_dataclass(before) and isinstance(value, Mapping):
+            changed[name] = with_values(before, value, f"{outer}{name}.")
+            continue
+        try:
+            changed[name] = _fitted(hints[name], value)
+        except TypeError:
+            raise OptionError(
+                f"`{outer}{name}` {value!r}: expected {_wanted(hints[name])}"
+            ) from None
+    return dataclasses.replace(default, **changed)  # type: ignore[type-var]
+
+
+def changed_fields(instance: Any, default: Any) -> list[str]:
+    """The names of the fields in which two instances of a dataclass differ."""
+    return [
+        field.name
+        for field in dataclasses.fields(instance)
+        if getattr(instance, field.name) != getattr(default, field.name)
+    ]
+
+
+def require_known(given: Mapping[str, Any], known: Any, outer: str = "") -> None:
+    """Refuse names that are not among those that are known.
+
+    Raises:
+        OptionError: If there is one, with what may have been meant.
+    """
+    for name in given:
+        if name not in known:
+            near = get_close_matches(name, sorted(known), n=3)
+            hint = (
+                f"did you mean {' or '.join(f'`{outer}{one}`' for one in near)}?"
+                if near
+                else f"expected one of {', '.join(sorted(known))}"
+            )
+            raise OptionError(f"`{outer}{name}`: no such option; {hint}")
+
+
+def _fitted(hint: Any, value: Any) -> Any:
+    """A value as a field of a type holds it.
+
+    Raises:
+        TypeError: If it is of another type.
+    """
+    origin, inside = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        for one in inside:
+            with suppress(TypeError):
+                return _fitted(one, value)
+        raise TypeError
+    if origin is Literal:
+        fits = any(type(value) is type(one) and value == one for one in inside)
+    elif origin is tuple:
+        fits = isinstance(value, (list, tuple))
+        if fits:
+            is_any_length = inside[-1] is Ellipsis
+            if not is_any_length and len(value) != len(inside):
+                raise TypeError
+            hints = [inside[0]] * len(value) if is_any_length else inside
+            value = tuple(_fitted(one, item) for one, item in zip(hints, value, strict=True))
+    elif hint is int:
+        fits = isinstance(value, Integral) and not isinstance(value, bool)
+        value = int(value) if fits else value
+    elif hint is float:
+        fits = isinstance(value, Real) and not isinstance(value, bool)
+        value = float(value) if fits else value
+    elif hint is Path:
+        fits = isinstance(value, (str, Path))
+        value = Path(value) if fits else value
+    else:
+        fits = isinstance(value, hint)
+    if not fits:
+        raise TypeError
+    return value
+
+
+def _wanted(hint: Any) -> str:
+    """What a field of a type takes, in words."""
+    origin, inside = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        return " or ".join(_wanted(one) for one in inside if one is not NoneType)
+    if origin is Literal:
+        choices = [*map(str, inside)]
+        return " or ".join(choices) if len(choices) < 3 else f"one of {', '.join(choices)}"
+    if origin is tuple:
+        return f"a list, each {_wanted(inside[0])}"
+    if dataclasses.is_dataclass(hint):
+        return "its own fields by name"
+    return _WANTED.get(hint) or str(hint.__name__)
+
+
+def field_texts(kind: type) -> dict[str, str]:
+    """The string under each field of a dataclass, and of those that it is made of, by name."""
+    found: dict[str, str] = {}
+    for one in reversed(kind.__mro__):
+        if not dataclasses.is_dataclass(one):
+            continue
+        try:
+            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(one))).body
+        except (OSError, TypeError):  # installed without its source
+            continue
+        assert isinstance(tree, ast.ClassDef)
+        for field, text in zip(tree.body, tree.body[1:], strict=False):
+            if (
+                isinstance(field, ast.AnnAssign)
+                and isinstance(field.target, ast.Name)
+                and isinstance(text, ast.Expr)
+                and isinstance(text.value, ast.Constant)
+            ):
+                found[field.target.id] = str(text.value.value)
+    return found

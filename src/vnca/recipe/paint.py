@@ -1,0 +1,298 @@
+"""A sequence in the style of a picture in one go: training, painting and a film."""
+
+import dataclasses
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+import vnca
+from vnca.core.errors import FileFormatError, OptionError, OutputError
+from vnca.core.files import existing_file, whole_file, writable_folder
+from vnca.core.watch import SILENT, Watch
+from vnca.io.sequence import Frame, FrameSequence
+from vnca.io.smoke import SmokeFormat, read_smoke
+from vnca.io.smoke_format import NO_VELOCITY
+from vnca.painting.config import StylizeConfig
+from vnca.recipe import painting
+from vnca.recipe.film import FilmConfig
+from vnca.recipe.options import changed, distributed
+from vnca.recipe.recorded import recorded, recorded_smoke
+from vnca.recipe.sequence import open_sequence
+from vnca.rule.model import MODEL_NAME, Model
+from vnca.rule.rule import SMOKE_THRESHOLD, density_scale
+
+COMMAND = "paint"
+RUN, PAINTED, FILM = "run", "painted", "film.mp4"
+"""In the folder: the run of the training, the painted frames and the film of them."""
+ASKED_NAME = "paint.json"
+"""In the folder: what was asked for, to go on with nothing else."""
+MODEL_SUFFIX = ".safetensors"
+LOOKED_AT = 12
+"""Frames, at most, of which the one with the most smoke is trained on."""
+_OF_TRAINING = ("preset", "training_frame", "device", "memory_budget")
+_ANY_TIME = ("out", "resume", "overwrite", "device", "memory_budget")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaintRun:
+    """A sequence painted in the style of a picture, and filmed."""
+
+    sequence: str
+    """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
+    style: Path
+    """The picture to learn from: PNG, JPEG, WebP, OpenEXR, …; or a model that has learned already,
+    a file or the folder of a run."""
+    out: Path
+    """Folder for all of it: run, painted and film.mp4."""
+    preset: str = "draft"
+    """How the rule is trained: draft, standard, paper, or a TOML file."""
+    training_frame: int | None = None
+    """Number of the frame that is trained on; one with much smoke unless given."""
+    frames: str | None = None
+    """Frames to paint, such as 30-53 or 1,4,7-9; all unless given."""
+    refine: Literal[1, 2, 3, 4] = 1
+    """Paint on a grid so many times as fine as that of the smoke."""
+    seed: int = 0
+    """Same seed, same machine, same painting."""
+    device: str = "auto"
+    """Where to train: auto, cpu or cuda."""
+    memory_budget: str = "auto"
+    """Memory for the training, such as 12GB; auto takes what is free."""
+    resume: bool = False
+    """Go on where an earlier call was interrupted, with the same options."""
+    overwrite: bool = False
+    """Replace what an earlier call left in the folder."""
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
+    """How smoke is read from files."""
+    film: FilmConfig = field(default_factory=FilmConfig)
+    """How the painting is filmed."""
+
+    def __post_init__(self) -> None:
+        if self.resume and self.overwrite:
+            raise OptionError("`resume`, `overwrite`: one of them, not both")
+        idle = [n for n in _OF_TRAINING if getattr(self, n) != getattr(PaintRun, n)]
+        if idle and self.is_trained:
+            raise OptionError(f"`{idle[0]}`: {self.style} is a model, which is trained already")
+
+    @property
+    def is_trained(self) -> bool:
+        """Whether the style is a model rather than a picture."""
+        return self.style.suffix.lower() == MODEL_SUFFIX or self.style.is_dir()
+
+
+def paint(
+    sequence: str | Path,
+    style: str | Path,
+    out: str | Path,
+    *,
+    preset: str | Path = "draft",
+    training_frame: int | None = None,
+    frames: str | None = None,
+    refine: Literal[1, 2, 3, 4] = 1,
+    seed: int = 0,
+    device: str = "auto",
+    memory_budget: str = "auto",
+    resume: bool = False,
+    overwrite: bool = False,
+    film: FilmConfig | Mapping[str, Any] | None = None,
+    watch: Watch = SILENT,
+    **options: Any,
+) -> list[Path]:
+    """Paint a sequence of smoke in the style of a picture, as `vnca paint` does.
+
+    Args:
+        sequence: A folder, a pattern (`smoke_####.vdb`) or a file.
+        style: A picture to learn from; or a model, or the folder of a run.
+        out: Folder for the run of the training, the painted frames and the film.
+        preset: How the rule is trained: `draft`, `standard`, `paper`, or the path of a TOML file.
+        training_frame: Number of the frame that is trained on; one with much smoke unless given.
+        frames: Which frames to paint, such as `30-53`; all unless given.
+        refine: Paint on a grid so many times as fine as the smoke's.
+        seed: Same seed, same machine, same painting.
+        device: Where to train: `auto`, `cpu` or `cuda`.
+        memory_budget: Memory for the training, such as `12GB`.
+        resume: Go on where an earlier call was interrupted, or else begin.
+        overwrite: Replace what an earlier call left in the folder.
+        film: How it is filmed: a `FilmConfig`, or some of its fields.
+        watch: Is told how far it has come, and may cancel.
+        **options: Fields of `SmokeFormat` (`velocity_units="mantaflow"`); in the place of those
+            that were recorded where `style` is a model.
+
+    Returns:
+        The painted files.
+
+    Raises:
+        VncaError: If an input cannot be used, the folder cannot be written, training diverges, or
+            memory runs out.
+        KeyboardInterrupt: If it is cancelled; the folder holds what it takes to resume.
+    """
+    asked = PaintRun(
+        sequence=str(sequence),
+        style=Path(style),
+        out=Path(out),
+        preset=str(preset),
+        training_frame=training_frame,
+        frames=frames,
+        refine=refine,
+        seed=seed,
+        device=device,
+        memory_budget=memory_budget,
+        resume=resume,
+        overwrite=overwrite,
+        film=changed("film", FilmConfig(), film),
+    )
+    (smoke,) = distributed(options, recorded_format(asked))
+    return [path for path in run(dataclasses.replace(asked, smoke=smoke), watch) if path]
+
+
+def recorded_format(options: PaintRun) -> SmokeFormat:
+    """How the model of the options says that smoke is read; as asked if there is none yet."""
+    if not options.is_trained:
+        return options.smoke
+    return recorded_smoke(options.style, Model.load(options.style)) or options.smoke
+
+
+def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
+    """Train, and paint frame by frame.
+
+    Yields:
+        The file of each frame as it is finished.
+
+    Raises:
+        VncaError: As `paint` does.
+    """
+    sequence = open_sequence(options.sequence, options.frames, watch)
+    goes_on = _begin(options)
+    model, smoke = options.style, options.smoke
+    if not options.is_trained:
+        try:
+            model = _trained(options, sequence, watch, goes_on=goes_on)
+        except KeyboardInterrupt:
+            watch.note(f"to go on with all of it: the same vnca {COMMAND} with `resume`")
+            raise
+        # With the velocity's scale as it was fitted for the training.
+        smoke = recorded_smoke(model, Model.load(model)) or smoke
+    asked = painting.StylizeRun(
+        model=model,
+        sequence=options.sequence,
+        out=options.out / PAINTED,
+        frames=options.frames,
+        preview=options.out / FILM,
+        refine=options.refine,
+        resume=goes_on,
+        overwrite=options.overwrite,
+        smoke=smoke,
+        config=StylizeConfig(seed=options.seed),
+        film=options.film,
+    )
+    with closing(painting.run(asked, watch)) as paths:  # type: ignore[type-var]
+        yield from paths
+
+
+def _begin(options: PaintRun) -> bool:
+    """Whether an earlier call is gone on with; what is asked is written down if not.
+
+    Raises:
+        OutputError: If the folder cannot be written, or holds an earlier call's work.
+        OptionError: If something else was asked for then.
+        FileFormatError: If what was asked for then cannot be read.
+    """
+    path = writable_folder(options.out) / ASKED_NAME
+    now = json.loads(json.dumps(_asked(options)))
+    has_begun = any((options.out / name).exists() for name in (RUN, PAINTED))
+    if path.exists() and has_begun and not options.overwrite:
+        if not options.resume:
+            raise OutputError(
+                f"{options.out}: holds a painting already; go on with `resume`, or choose another "
+                "`out` or `overwrite`"
+            )
+        try:
+            then = json.loads(existing_file(path).read_text(encoding="utf-8"))
+            others = [name for name in now if then.get(name) != now[name]]
+        except (OSError, ValueError, AttributeError) as error:
+            raise FileFormatError(f"{path}: damaged ({error}); begin anew") from error
+        if others:
+            raise OptionError(
+                f"{options.out}: cannot go on, since `{others[0]}` is another than when it was "
+                "begun; make it the same, or begin anew with `overwrite`"
+            )
+        return True
+    options.out.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(now, indent=2) + "\n", encoding="utf-8")
+    return False
+
+
+def _asked(options: PaintRun) -> dict[str, Any]:
+    """What has to be the same to go on, as JSON values."""
+    asked = {k: v for k, v in recorded(options).items() if k not in (*_ANY_TIME, "film")}
+    asked |= {"style": str(options.style.absolute()), "vnca": vnca.__version__}
+    if not options.is_trained:
+        # A file of a user may have been changed.
+        from vnca.training.presets import preset
+        from vnca.training.smoke_config import SmokeConfig
+
+        asked["preset"] = recorded(preset(SmokeConfig, options.preset))
+    return asked
+
+
+def _trained(options: PaintRun, sequence: FrameSequence, watch: Watch, *, goes_on: bool) -> Path:
+    """The folder of a run that has come to its end."""
+    # Painting with a model needs no torch.
+    from vnca.recipe import smoke
+    from vnca.training.checkpoint import CHECKPOINT_NAME
+    from vnca.training.presets import preset
+    from vnca.training.smoke_config import SmokeConfig
+
+    folder = options.out / RUN
+    if goes_on and (folder / CHECKPOINT_NAME).exists():
+        again = smoke.ResumeSmokeRun(resume=folder, memory_budget=options.memory_budget)
+        smoke.resume_run(again, watch)
+    elif not (goes_on and (folder / MODEL_NAME).exists()):
+        frame = _training_frame(options, sequence)
+        watch.note(f"training on {frame.path}")
+        config = dataclasses.replace(preset(SmokeConfig, options.preset), seed=options.seed)
+        asked = smoke.SmokeRun(
+            frame=frame.path,
+            style=options.style,
+            out=folder,
+            preset=options.preset,
+            overwrite=options.overwrite,
+            device=options.device,
+            memory_budget=options.memory_budget,
+            smoke=options.smoke,
+            config=config,
+        )
+        smoke.run(asked, watch)
+    return folder
+
+
+def _training_frame(options: PaintRun, sequence: FrameSequence) -> Frame:
+    """The frame that is trained on: the one asked for, or of some the one with the most smoke.
+
+    Raises:
+        OptionError: If there is no such frame.
+        FileFormatError: If a frame cannot be read.
+    """
+    if options.training_frame is not None:
+        for frame in sequence:
+            if frame.number == options.training_frame:
+                return frame
+        raise OptionError(
+            f"`training_frame` {options.training_frame}: is not among the frames of "
+            f"{options.sequence}"
+        )
+    seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
+    last = len(sequence) - 1
+    picked = sorted({round(at) for at in np.linspace(0, last, min(LOOKED_AT, len(sequence)))})
+
+    def cells(at: int) -> int:
+        density = read_smoke(sequence[at].path, seen).density_field.values
+        return int(np.count_nonzero(density > SMOKE_THRESHOLD * density_scale(density)))
+
+    return sequence[max(picked, key=cells)]
