@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from vnca.bench.timing import Spread, in_turns
+from vnca.bench.measurement import Spread, in_turns
 from vnca.core.typing import AnyArray, Box
 from vnca.engine.decode_backend import array_decode, torch_decode
 from vnca.engine.decode_weights import Weights

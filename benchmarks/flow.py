@@ -29,14 +29,13 @@ from torch.nn import functional
 
 import vnca
 from msoe import published
-from vnca.bench.machine import run_facts
-from vnca.bench.records import append_csv, write_json
+from vnca.bench.measurement import append_csv, run_facts, write_json
 from vnca.core.camera import frame_box
 from vnca.core.errors import VncaError
 from vnca.features.flow import FlowNetwork
 from vnca.io.picture import read_image
 from vnca.io.smoke import SmokeFormat, read_smoke
-from vnca.metrics.estimators import Estimator, dis, estimator_of, farneback
+from vnca.metrics.motion import Estimator, dis, estimator_of, farneback
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
 from vnca.rendering.sample import sample
 from vnca.rendering.velocity import projected_velocity

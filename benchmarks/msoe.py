@@ -18,7 +18,7 @@ from torch.nn import functional
 from vnca.core.errors import FileFormatError
 from vnca.core.files import existing_file
 from vnca.core.typing import FloatArray
-from vnca.metrics.estimators import Estimator
+from vnca.metrics.motion import Estimator
 
 SCALES = 5
 

@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 
 from vnca.bench.cases import Case
-from vnca.bench.records import append_csv
+from vnca.bench.measurement import append_csv
 from vnca.bench.step import StepConfig, measure, prepare, take_part
 from vnca.core.typing import Index
 

@@ -18,8 +18,8 @@ from harness import fuzz
 from PIL import Image
 
 with atheris.instrument_imports(include=["vnca"]):
+    from vnca.io.mesh import read_mesh
     from vnca.io.mesh.glb import Glb
-    from vnca.io.mesh.mesh import read_mesh
     from vnca.io.mesh.texture import Unwrapping, base_colours, put_on
 
 _BETWEEN = b"\0\0\0\0"

@@ -22,7 +22,7 @@ with atheris.instrument_imports(include=["vnca"]):
     from vnca.io import vdb_smoke
     from vnca.io.smoke import SmokeFormat, read_smoke
     from vnca.io.vdb import VALUE_TYPES, Grid, Tiles, Transform, open_vdb, write_vdb
-    from vnca.io.vdb.cursor import Cursor, encode_string
+    from vnca.io.vdb.layout import Cursor, encode_string
     from vnca.io.vdb.metadata import Metadata, read_metadata
 
 _BETWEEN = b"\xfe\xfd\xfe"

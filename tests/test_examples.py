@@ -33,3 +33,10 @@ def test_arrays(capsys: pytest.CaptureFixture[str]) -> None:
     example("arrays").main("1")
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(":")[0] for line in lines] == [f"frame {n}" for n in range(1, 6)]
+
+
+@pytest.mark.slow
+def test_a_conditioning_field(capsys: pytest.CaptureFixture[str]) -> None:
+    example("conditioning_field").main("1")
+    lines = [line.partition(":")[0] for line in capsys.readouterr().out.splitlines()]
+    assert lines == [f"at {k} K, frame {n}" for k in (1500, 0) for n in (1, 2, 3)]

@@ -20,10 +20,8 @@ import vnca
 from vnca.bench.cases import PROBABILITY, Case, Place
 from vnca.bench.contenders import DTYPES
 from vnca.core.typing import Index
-from vnca.engine.automaton import Automaton, Weights
-from vnca.engine.backend import open_session
-from vnca.engine.session import Compute
-from vnca.engine.stencil import stencil
+from vnca.engine.automaton import Automaton, Weights, stencil
+from vnca.engine.session import Compute, open_session
 
 COLUMNS = ("date", "device", "torch", "vnca", "what", "dtype", "grid", "occupancy", "ms", "peak_mb")
 

@@ -8,7 +8,7 @@ import argparse
 import json
 from pathlib import Path
 
-from vnca.bench.records import append_csv
+from vnca.bench.measurement import append_csv
 from vnca.bench.step import StepConfig, measure_steps, prepare
 from vnca.core.typing import Index
 

@@ -14,7 +14,7 @@ from triton.runtime.errors import OutOfResources
 
 from vnca.bench.cases import Case, Place
 from vnca.bench.contenders import DTYPES, contender
-from vnca.bench.timing import Begin, seconds
+from vnca.bench.measurement import Begin, seconds
 from vnca.engine.triton import step as triton
 
 CHOICES: dict[str, tuple[Any, ...]] = {

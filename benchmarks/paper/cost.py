@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from judge import AROUND, PAINTED, Judge, magnified
 from study import REFERENCE, Findings, Study, run
 
-from vnca.bench.memory import peak_mb
+from vnca.bench.measurement import peak_mb
 from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
 from vnca.painting.roll import Roll

@@ -21,7 +21,7 @@ from vnca.painting.roll import Painting, stylize
 from vnca.recipe import simulation
 from vnca.recipe.sequence import open_sequence, sequence_region, volumes
 from vnca.rule.rule import Rule
-from vnca.simulation.scenes import simulate
+from vnca.simulation import simulate
 
 RESOLUTION = 48
 """Of simulated scenes: cells across."""

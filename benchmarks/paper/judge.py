@@ -11,8 +11,8 @@ from vnca.core.camera import frame_box
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.load import load_network
+from vnca.io.film import contact_sheet
 from vnca.io.picture import fit, read_image
-from vnca.io.sheet import contact_sheet
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import Painting, Roll

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 from judge import Judge, paint
 from study import Findings, Study, run
 
-from vnca.metrics.estimators import dis, ours
-from vnca.metrics.motion import MotionMeasures, measure_motion
+from vnca.metrics.motion import MotionMeasures, dis, measure_motion, ours
 
 
 @dataclass(frozen=True)

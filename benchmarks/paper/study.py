@@ -13,8 +13,7 @@ import numpy as np
 import torch
 import tyro
 
-from vnca.bench.machine import run_facts
-from vnca.bench.records import append_csv
+from vnca.bench.measurement import append_csv, run_facts
 from vnca.core.errors import OptionError, VncaError
 from vnca.core.files import existing_file, writable_folder
 from vnca.core.typing import FloatArray

@@ -22,15 +22,14 @@ from typing import Any
 import torch
 from solid import optimised_blocks
 
-from vnca.bench.machine import run_facts
-from vnca.bench.records import append_csv, write_json
+from vnca.bench.measurement import append_csv, run_facts, write_json
 from vnca.core.typing import FloatArray
 from vnca.engine.session import Compute
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
 from vnca.io.picture import read_image
 from vnca.losses.appearance import AppearanceLoss
-from vnca.metrics.slice_distance import slice_distances
+from vnca.metrics.style_score import slice_distances
 from vnca.painting.block import border_jump, grow
 from vnca.rule.model import Model
 from vnca.rule.rule import Rule

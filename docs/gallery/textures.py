@@ -14,9 +14,9 @@ import knot
 from workshop import HERE, drawn, made, texture_of
 
 from vnca.core.typing import FloatArray
-from vnca.io.mesh.mesh import read_mesh
+from vnca.io.film import contact_sheet
+from vnca.io.mesh import read_mesh
 from vnca.io.picture import fit, read_image, write_image
-from vnca.io.sheet import contact_sheet
 from vnca.meshes.turntable import Turntable, TurntableConfig, textured
 
 FILMS = HERE / "textures"

@@ -36,9 +36,10 @@ if TYPE_CHECKING:
     from vnca.recipe.texture import texture
     from vnca.rendering.view import View
     from vnca.rendering.view import render as render_view
+    from vnca.rule.conditioning import Conditioning, register_conditioning
     from vnca.rule.model import Model
     from vnca.rule.rule import Rule, RuleConfig, Scales
-    from vnca.simulation.scenes import simulate as simulate_smoke
+    from vnca.simulation import simulate as simulate_smoke
     from vnca.training.loop import Trainer
     from vnca.training.presets import preset
     from vnca.training.smoke_config import SmokeConfig
@@ -63,6 +64,8 @@ _HOMES = {
     "Watch": "core.watch",
     "Cancelled": "core.errors",
     "Box": "core.typing",
+    "Conditioning": "rule.conditioning",
+    "register_conditioning": "rule.conditioning",
     "FilmWriter": "io.film",
     "Lattice": "core.lattice",
     "Model": "rule.model",
@@ -87,7 +90,7 @@ _HOMES = {
     "read_image": "io.picture",
     "read_smoke": "io.smoke",
     "render_view": "rendering.view:render",
-    "simulate_smoke": "simulation.scenes:simulate",
+    "simulate_smoke": "simulation:simulate",
     "smoke_box": "io.smoke",
     "smoke_trainer": "training.smoke_trainer",
     "stylize_frames": "painting.roll:stylize",
@@ -100,6 +103,7 @@ _HOMES = {
 __all__ = [
     "Box",
     "Cancelled",
+    "Conditioning",
     "Evaluation",
     "FilmConfig",
     "FilmWriter",
@@ -131,6 +135,7 @@ __all__ = [
     "preset",
     "read_image",
     "read_smoke",
+    "register_conditioning",
     "render",
     "render_view",
     "simulate",

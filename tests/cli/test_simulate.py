@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from vnca.io.smoke import SmokeFormat, read_smoke
-from vnca.simulation.scenes import simulate
+from vnca.simulation import simulate
 
 Vnca = Callable[..., Any]
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.core.bricks.field import Field
 from vnca.core.errors import GridError
+from vnca.core.field import Field
 from vnca.core.lattice import (
     Beyond,
     Lattice,

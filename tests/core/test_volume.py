@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from vnca.core.errors import ShapeError
 from vnca.core.typing import AnyArray
 from vnca.core.volume import Volume
 
@@ -80,3 +81,13 @@ def test_a_frame_without_smoke_has_none_on_a_finer_grid() -> None:
 def test_the_length_of_a_cell_is_that_of_a_cube_as_large() -> None:
     assert ramp().cell_length == pytest.approx(np.cbrt(0.5 * 0.25 * 2))
     assert ramp().refined(2).cell_length == pytest.approx(ramp().cell_length / 2)
+
+
+def test_named_fields_are_refined_as_the_smoke_is_and_cover_its_cells() -> None:
+    density = np.random.default_rng(0).random((4, 4, 4), np.float32)
+    smoke = Volume(density, None, (1, 2, 3), np.eye(4), 1, fields={"heat": 2 * density})
+    fine = smoke.refined(2)
+    np.testing.assert_allclose(fine.named_fields["heat"].dense(), 2 * fine.density, rtol=1e-6)
+    assert fine.named_fields["heat"].box == fine.box
+    with pytest.raises(ShapeError, match=r"fields: heat: expected \(4, 4, 4\) .* got \(3, 4, 4\)"):
+        Volume(density, None, (1, 2, 3), np.eye(4), 1, fields={"heat": density[:3]})

@@ -4,8 +4,8 @@ import resource
 
 import numpy as np
 
+from vnca.engine.automaton import stencil
 from vnca.engine.native import step as native
-from vnca.engine.stencil import stencil
 
 CELLS, CHANNELS, HIDDEN, THREADS = 60_000, 12, 16, 4
 

@@ -12,14 +12,12 @@ from torch import Tensor
 
 from vnca.core.errors import ShapeError
 from vnca.core.typing import AnyArray, FloatArray, IntArray
-from vnca.engine.automaton import Weights
+from vnca.engine.automaton import Weights, changing_rows, stencil
 from vnca.engine.domain import Border, Domain
-from vnca.engine.mask import changing_rows
 from vnca.engine.native import step as native
 from vnca.engine.native.step_autograd import update as native_update
 from vnca.engine.reference import step as reference
 from vnca.engine.session import PRECISIONS
-from vnca.engine.stencil import stencil
 from vnca.engine.triton import step as triton_backend
 
 KERNELS: dict[str, dict[str, Any]] = {
@@ -298,7 +296,7 @@ def test_a_state_gone_wrong_stays_visible_and_local_with_triton() -> None:
 @needs_triton
 @pytest.mark.parametrize("probability", [0.5, 1 - 2.0**-40, 1.0])
 def test_the_mask_drawn_by_triton_has_the_same_bits(probability: float) -> None:
-    from vnca.engine.triton import mask as triton_mask
+    from vnca.engine.triton import step_kernels as triton_mask
 
     hashes = np.random.default_rng(0).integers(0, 2**32, 3000, dtype=np.uint32)
     on_device = torch.from_numpy(hashes.view(np.int32)).to(DEVICE)

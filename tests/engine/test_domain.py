@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from vnca.core.bricks.field import Field
 from vnca.core.errors import OptionError
+from vnca.core.field import Field
 from vnca.core.typing import AnyArray, BoolArray, Box, Index, IntArray
+from vnca.engine.automaton import OFFSETS
 from vnca.engine.domain import Domain
-from vnca.engine.stencil import OFFSETS
 
 
 def random_domain(seed: int, shape: tuple[int, int, int], border: str = "replicate") -> Domain:

@@ -9,11 +9,9 @@ from torch import Tensor
 from torch.nn import functional
 
 from vnca.core.typing import AnyArray, Box
-from vnca.engine.automaton import Weights
+from vnca.engine.automaton import OFFSETS, Weights, changing_rows, hash_cells, stencil
 from vnca.engine.domain import Domain
-from vnca.engine.mask import changing_rows, hash_cells
 from vnca.engine.reference.step import update
-from vnca.engine.stencil import OFFSETS, stencil
 
 CHANNELS, HIDDEN, PRIORS = 4, 6, 3
 

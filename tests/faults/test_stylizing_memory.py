@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from vnca.io.smoke import write_smoke
-from vnca.simulation.scenes import simulate
+from vnca.simulation import simulate
 
 pytestmark = [
     pytest.mark.faults,

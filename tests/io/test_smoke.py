@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 
 from vnca.core.errors import FileFormatError, GridError, OptionError, SequenceError
+from vnca.core.lattice import Lattice
 from vnca.core.typing import AnyArray, Box, Index
 from vnca.core.volume import Volume
 from vnca.io.sequence import Frame
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, with_fitted_scale, write_smoke
+from vnca.io.smoke_format import reader_of, register_reader
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 
 PLAIN = SmokeFormat()
+HEATED = SmokeFormat(fields=("temperature",))
 TRANSFORM = Transform.uniform(0.5, (1, 2, 3))
 SHAPE = (5, 6, 7)
 ORIGIN = (10, -3, 2)
@@ -394,3 +397,43 @@ def test_the_velocity_scale_is_fitted_to_neighbouring_frames(tmp_path: Path) -> 
     write_smoke(frames[1].path, drifting(2, speed=-4))
     with pytest.raises(GridError, match="no velocity scale up to 4"):
         with_fitted_scale(form, frames)
+
+
+def test_further_grids_are_read_onto_the_cells_of_the_density(tmp_path: Path) -> None:
+    active = np.ones(SHAPE, np.bool_)
+    active[0] = False
+    heat = grid("temperature", 300 + density(3), active=active)
+    path = saved(tmp_path / "s.vdb", grid("density", density()), heat)
+    assert read_smoke(path, PLAIN).fields == {}
+    (name, found), *others = read_smoke(path, HEATED).named_fields.items()
+    assert (name, others) == ("temperature", [])
+    np.testing.assert_array_equal(found.dense(), np.where(active, 300 + density(3), 0))
+    # On other cells they go where the density goes.
+    mirrored = Transform.from_matrix(np.diag([-0.5, 0.5, 0.5, 1]))
+    grids = [grid(n, density(), transform=mirrored) for n in ("density", "temperature")]
+    smoke = read_smoke(saved(tmp_path / "m.vdb", *grids), HEATED, lattice=Lattice(np.eye(4)))
+    np.testing.assert_allclose(smoke.named_fields["temperature"].dense(), smoke.density)
+
+
+def test_a_further_grid_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    plain = grid("density", density())
+    for name, other, words in (
+        ("a.vdb", grid("heat", density()), "no grid 'temperature'; choose `fields` from density"),
+        ("b.vdb", grid("temperature", vectors()), "grid 'temperature' holds vec3s, expected num"),
+        (
+            "c.vdb",
+            grid("temperature", density(), transform=Transform.uniform(1)),
+            "grid 'temperature' has other cells than the density",
+        ),
+    ):
+        with pytest.raises(GridError, match=rf"{name}: {words}"):
+            read_smoke(saved(tmp_path / name, plain, other), HEATED)
+    np.savez(tmp_path / "d.npz", x=density())
+    with pytest.raises(OptionError, match="`fields` temperature: an npz file has none"):
+        read_smoke(tmp_path / "d.npz", HEATED)
+
+
+def test_a_reader_is_not_registered_for_a_format_of_our_own(tmp_path: Path) -> None:
+    for suffix in (".vdb", ".SMOKE", "smoke"):
+        with pytest.raises(OptionError, match="expected one such as"):
+            register_reader(suffix, reader_of(tmp_path / "a.npz"))

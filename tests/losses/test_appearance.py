@@ -16,7 +16,7 @@ from vnca.core.typing import FloatArray
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
 from vnca.losses.appearance import Appearance, AppearanceConfig, AppearanceLoss
-from vnca.losses.pixels import luma
+from vnca.losses.terms import luma
 
 SIZE = 48
 # The deeper ones take most of the time.

@@ -1,15 +1,23 @@
+"""How near views come to the style picture, by measures and by networks."""
+
 import dataclasses
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
+from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import GridError
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
-from vnca.metrics.setup import Coloured, Setup
+from vnca.features.load import load_network
+from vnca.metrics.setup import Coloured, Pair, Seen, Setup, Viewpoint
 from vnca.metrics.style import StyleMetric
-from vnca.metrics.style_score import SIDES, measure_style, style_score
+from vnca.metrics.style_score import SIDES, Judge, measure_style, style_score
 from vnca.rule.rule import Rule, RuleConfig, Scales
+
+SIZE = 64
+DISC = np.hypot(*(np.mgrid[:SIZE, :SIZE] - SIZE / 2)) < 24
 
 
 def rule(gamma: float = 5.0, paint: float = 0.05) -> Rule:
@@ -93,3 +101,63 @@ def test_plain_smoke_is_grey_and_its_shape_can_be_seen(tiny_smoke: Volume) -> No
     seen = setup.look(Coloured.plain(tiny_smoke), SIDES[0]).over([0, 0, 0])
     np.testing.assert_allclose(seen.max(-1), seen.min(-1), atol=1e-6)
     assert seen[20:24, 32].mean() > 1.2 * seen[40:44, 32].mean()
+
+
+def painting(seed: int, hue: tuple[float, float, float], size: int = SIZE) -> FloatArray:
+    """Blobs in two colours, the same everywhere."""
+    noise = gaussian_filter(np.random.default_rng(seed).standard_normal((size, size)), 1.5)
+    part = (np.tanh(noise / noise.std() * 2) * 0.5 + 0.5)[..., None]
+    shown = part * np.float32(hue) + (1 - part) * np.float32([0.1, 0.1, 0.3])
+    return srgb_to_linear(shown).astype(np.float32)
+
+
+PICTURE = painting(0, (0.9, 0.8, 0.2), 96)
+
+
+def seen(colour: FloatArray, opaque: np.ndarray = DISC) -> Seen:
+    opacity = opaque.astype(np.float32)
+    return Seen(colour * opacity[..., None], opacity, np.ones_like(opacity))
+
+
+def pair(colour: FloatArray, opaque: np.ndarray = DISC) -> Pair:
+    grey = np.full((SIZE, SIZE, 3), 0.214, np.float32)
+    return Pair(Viewpoint(0.0, 0.0), seen(colour, opaque), seen(grey, opaque))
+
+
+@pytest.fixture(scope="module")
+def metric() -> StyleMetric:
+    return StyleMetric(PICTURE, 96)
+
+
+@pytest.fixture(params=["edges", "efficientnet"])
+def judge(request: pytest.FixtureRequest, metric: StyleMetric) -> Judge:
+    return Judge.of(load_network(request.param), False, metric, SIZE)
+
+
+def test_more_of_the_style_closes_the_gap_and_other_colours_do_not(
+    judge: Judge, metric: StyleMetric
+) -> None:
+    judge.look(1, [pair(PICTURE[:SIZE, :SIZE])], metric)
+    judge.look(2, [pair(painting(1, (0.9, 0.8, 0.2)))], metric)
+    judge.look(3, [pair(painting(1, (0.2, 0.9, 0.9)))], metric)
+    judge.look(4, [pair(np.full((SIZE, SIZE, 3), 0.214, np.float32))], metric)
+    assert judge.shares[1] > 0.7
+    assert judge.shares[2] > 0.6
+    assert judge.shares[3] < judge.shares[2] - 0.2
+    assert judge.shares[4] == 0
+
+
+def test_cut_outs_may_be_smaller_than_what_a_network_takes(
+    judge: Judge, metric: StyleMetric
+) -> None:
+    small = np.hypot(*(np.mgrid[:SIZE, :SIZE] - SIZE / 2)) < 8
+    judge.look(1, [pair(painting(1, (0.9, 0.8, 0.2)), small)], metric)
+    assert np.isfinite(judge.shares[1])
+
+
+def test_views_without_opaque_smoke_say_nothing(judge: Judge, metric: StyleMetric) -> None:
+    judge.look(1, [pair(PICTURE[:SIZE, :SIZE], np.zeros_like(DISC))], metric)
+    assert not judge.shares
+    judge = Judge("imagenet", None, "not installed")
+    judge.look(1, [pair(PICTURE[:SIZE, :SIZE])], metric)
+    assert not judge.shares

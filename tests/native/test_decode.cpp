@@ -5,26 +5,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <random>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
+#include "checks.hpp"
 #include "decode.hpp"
 
 using namespace vnca;
 
 namespace {
-
-constexpr int THREADS[] = {1, 2, 3, 8};
-
-void expect(bool holds, const std::string& what) {
-    if (holds) return;
-    std::fprintf(stderr, "failed: %s\n", what.c_str());
-    std::exit(1);
-}
 
 // ---- Problems --------------------------------------------------------------------------------
 
@@ -177,16 +168,6 @@ Results<float> results(const DecodeKernel& kernel, const Problem& p, int threads
     return to;
 }
 
-// The norm of the difference over the norm.
-double error(const std::vector<float>& got, const std::vector<double>& expected) {
-    double difference = 0, norm = 1e-30;
-    for (std::size_t i = 0; i < got.size(); ++i) {
-        difference += (got[i] - expected[i]) * (got[i] - expected[i]);
-        norm += expected[i] * expected[i];
-    }
-    return std::sqrt(difference / norm);
-}
-
 void test_agreement(const Problem& p) {
     const Results<double> right = exact(p);
     for (const DecodeKernel* const* kernel = decode_kernels(); *kernel != nullptr; ++kernel) {
@@ -262,15 +243,7 @@ void test_parts_of_cells() {
 
 void test_callers_at_the_same_time() {
     const Problem p(CASES[2]);
-    const Results<float> alone = results(**decode_kernels(), p, 1);
-    std::vector<std::thread> callers;
-    for (int caller = 0; caller < 3; ++caller)
-        callers.emplace_back([&] {
-            for (const int threads : THREADS)
-                expect(results(**decode_kernels(), p, threads) == alone,
-                       "callers disturb each other");
-        });
-    for (std::thread& caller : callers) caller.join();
+    expect_the_same_of_callers([&](int threads) { return results(**decode_kernels(), p, threads); });
 }
 
 }  // namespace

@@ -6,28 +6,19 @@
 #include <bit>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <random>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
-#include "thread_pool.hpp"
+#include "checks.hpp"
 #include "step.hpp"
+#include "thread_pool.hpp"
 
 using namespace vnca;
 
 namespace {
-
-constexpr int THREADS[] = {1, 2, 3, 8};
-
-void expect(bool holds, const std::string& what) {
-    if (holds) return;
-    std::fprintf(stderr, "failed: %s\n", what.c_str());
-    std::exit(1);
-}
 
 // ---- Problems --------------------------------------------------------------------------------
 
@@ -214,16 +205,6 @@ Results<float> results(const Kernel& kernel, const Problem& p, int threads) {
     return to;
 }
 
-// The norm of the difference over the norm.
-double error(const std::vector<float>& got, const std::vector<double>& expected) {
-    double difference = 0, norm = 1e-30;
-    for (std::size_t i = 0; i < got.size(); ++i) {
-        difference += (got[i] - expected[i]) * (got[i] - expected[i]);
-        norm += expected[i] * expected[i];
-    }
-    return std::sqrt(difference / norm);
-}
-
 void test_agreement(const Problem& p) {
     const Results<double> in_float = exact(p, false), in_bfloat16 = exact(p, true);
     for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel) {
@@ -265,14 +246,7 @@ void test_neighbours_out_of_range() {
 
 void test_callers_at_the_same_time() {
     const Problem p(CASES[2]);
-    const Results<float> alone = results(**kernels(), p, 1);
-    std::vector<std::thread> callers;
-    for (int caller = 0; caller < 3; ++caller)
-        callers.emplace_back([&] {
-            for (const int threads : THREADS)
-                expect(results(**kernels(), p, threads) == alone, "callers disturb each other");
-        });
-    for (std::thread& caller : callers) caller.join();
+    expect_the_same_of_callers([&](int threads) { return results(**kernels(), p, threads); });
 }
 
 void test_an_exception_reaches_the_caller() {

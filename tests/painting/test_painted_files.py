@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vnca.core.bricks.field import Field
+from vnca.core.field import Field
 from vnca.core.lattice import Lattice
 from vnca.core.typing import Box
 from vnca.core.volume import Volume
 from vnca.engine.session import Compute
-from vnca.io.orientation import on_lattice
 from vnca.io.sequence import find_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, write_painted, write_smoke
+from vnca.io.smoke_format import on_lattice
 from vnca.io.vdb import open_vdb
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import Painting, Roll

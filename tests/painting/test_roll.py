@@ -14,9 +14,8 @@ from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError
 from vnca.core.typing import Box, FloatArray, IntArray
 from vnca.core.volume import Volume
-from vnca.engine.automaton import Automaton
+from vnca.engine.automaton import Automaton, changing_rows, hash_cells
 from vnca.engine.domain import Domain
-from vnca.engine.mask import changing_rows, hash_cells
 from vnca.engine.session import Compute, Job, Session, StepSession
 from vnca.painting import roll as roll_module
 from vnca.painting.ahead import read_ahead

@@ -1,17 +1,33 @@
 import dataclasses
 
 import numpy as np
+import pytest
 
 from vnca.core.colour import linear_to_srgb
+from vnca.core.errors import GridError, OptionError, ShapeError
 from vnca.core.lattice import Lattice, Region
-from vnca.core.typing import Box
+from vnca.core.typing import AnyArray, Box
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
-from vnca.rule.conditioning import normalised_velocity, priors
+from vnca.rule import conditioning
+from vnca.rule.conditioning import (
+    Conditioning,
+    normalised_velocity,
+    priors,
+    register_conditioning,
+)
 from vnca.rule.paint import colours, density_factors
 from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.training.pretraining import without_prior_weights
 
 SHAPE = (4, 2, 3)
+
+
+@pytest.fixture
+def known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An input of our own, which other tests do not know."""
+    monkeypatch.setattr(conditioning, "_KNOWN", dict(conditioning._KNOWN))
+    register_conditioning(Conditioning.of_field("heat", scale=10))
 
 
 def smoke() -> Volume:
@@ -146,3 +162,54 @@ def test_colour_and_density_stay_in_range_whatever_the_state() -> None:
     factors = density_factors(state)
     assert (factors.min(), factors.max()) == (0.5, 1.5)
     assert np.all(density_factors(state, strength=0) == 1)
+
+
+def told_heat(config: RuleConfig, **fields: AnyArray) -> AnyArray:
+    volume = dataclasses.replace(smoke(), fields=fields)
+    domain = Domain.from_mask(np.ones(SHAPE, bool), volume.origin)
+    return priors(domain, volume, Rule.initial(config, Scales(density=0.5), seed=0))
+
+
+def test_inputs_are_told_in_the_order_that_the_rule_lists_them(known: None) -> None:
+    heat = np.arange(np.prod(SHAPE), dtype=np.float32).reshape(SHAPE)
+    told = told_heat(RuleConfig(conditioning=("heat", "density")), heat=heat)
+    assert told.shape == (heat.size, 2)
+    domain = Domain.from_mask(np.ones(SHAPE, bool), smoke().origin)
+    np.testing.assert_allclose(domain.scatter(told[:, 0], domain.box), heat / 10)
+    np.testing.assert_allclose(domain.scatter(told[:, 1], domain.box), smoke().density / 0.5)
+    config = RuleConfig(conditioning=("heat", "velocity"), velocity_prior=False)
+    assert (config.inputs, config.columns("velocity")) == (5 * 12 + 4, None)
+    assert config.columns("heat") == slice(0, 1)
+    assert not told_heat(config, heat=heat)[:, 1:].any()
+
+
+def test_an_input_that_cannot_be_told_is_named(known: None) -> None:
+    config = RuleConfig(conditioning=("heat",))
+    with pytest.raises(GridError, match="frame 1: the rule is conditioned on heat, and the smoke"):
+        told_heat(config)
+    with pytest.raises(GridError, match="frame 1: conditioning heat: not all finite"):
+        told_heat(config, heat=np.full(SHAPE, np.nan, np.float32))
+    with pytest.raises(ShapeError, match=r"conditioning heat: expected \(24, 1\) .* \(24, 2\)"):
+        told_heat(config, heat=np.zeros((*SHAPE, 2), np.float32))
+
+
+def test_a_list_of_inputs_that_cannot_be_is_refused(known: None) -> None:
+    with pytest.raises(OptionError, match=r"`conditioning` wind: expected some of position.*heat"):
+        RuleConfig(conditioning=("density", "wind"))
+    with pytest.raises(OptionError, match="`conditioning` heat, heat: expected each of them once"):
+        RuleConfig(conditioning=("heat", "heat"))
+    with pytest.raises(OptionError, match="`name` density: expected another than position"):
+        register_conditioning(Conditioning.of_field("density"))
+    with pytest.raises(OptionError, match="`scale` 0"):
+        Conditioning.of_field("heat", scale=0)
+    with pytest.raises(OptionError, match="`width` 0"):
+        Conditioning.of_field("heat", width=0)
+
+
+def test_a_texture_gives_a_rule_its_patterns_whatever_that_is_conditioned_on(known: None) -> None:
+    texture = rule(position_prior=False)
+    begun = without_prior_weights(texture, ("heat",))
+    assert begun.config.conditioning == ("heat",)
+    np.testing.assert_array_equal(begun.hidden[:, :60], texture.hidden[:, :60])
+    assert begun.hidden.shape == (texture.config.hidden, 61)
+    assert not begun.hidden[:, 60].any()

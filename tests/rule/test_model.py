@@ -16,8 +16,12 @@ from safetensors.numpy import load_file, save_file
 
 from vnca.core.errors import FileFormatError, ModelError, OptionError, OutputError, ShapeError
 from vnca.core.lattice import Lattice, Region
-from vnca.core.typing import AnyArray, Box
+from vnca.core.typing import AnyArray, Box, FloatArray
+from vnca.core.volume import Volume
+from vnca.engine.domain import Domain
 from vnca.io.smoke_format import SmokeFormat
+from vnca.rule import conditioning
+from vnca.rule.conditioning import Conditioning, register_conditioning
 from vnca.rule.decoder import Decoder
 from vnca.rule.model import MODEL_NAME, Model, from_record
 from vnca.rule.rule import Rule, RuleConfig, Scales
@@ -185,7 +189,7 @@ def rewritten(path: Path, **changes: Any) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"format_version": 3}, r"newer than this vnca reads.*upgrade"),
+        ({"format_version": 4}, r"newer than this vnca reads.*upgrade"),
         ({"format_version": "one"}, "damaged"),
         ({"rule": None}, "damaged"),
         ({"rule": 3}, "damaged"),
@@ -361,3 +365,74 @@ def test_a_model_with_the_former_names_of_its_fields_loads() -> None:
     with safe_open(kept, framework="numpy") as file:
         assert '"reach"' in file.metadata()["vnca"]
     assert Model.load(kept).rule.config.dilation == 1
+
+
+def test_a_model_lists_what_it_is_conditioned_on(
+    model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / MODEL_NAME
+    model.save(path)
+    with safe_open(path, framework="numpy") as file:
+        described = json.loads(file.metadata()["vnca"])
+    assert described["conditioning"] == [["position", 3], ["density", 1], ["velocity", 3]]
+    rewritten(path, conditioning=None)  # as older ones are
+    assert Model.load(path).rule.config == model.rule.config
+
+    monkeypatch.setattr(conditioning, "_KNOWN", dict(conditioning._KNOWN))
+    register_conditioning(Conditioning("heat", 2, nothing))
+    config = replace(model.rule.config, conditioning=("velocity", "heat"))
+    own = Model(Rule.initial(config, model.rule.scales, seed=1))
+    own.save(path)
+    assert version_of(path) == 3
+    assert Model.load(path).rule.config == config
+    register_conditioning(Conditioning("heat", 1, nothing))
+    with pytest.raises(ModelError, match=r"\['heat', 2\] .* known by that name is \['heat', 1\]"):
+        Model.load(path)
+    monkeypatch.undo()
+    with pytest.raises(ModelError, match="conditioned on heat, which this program does not know"):
+        Model.load(path)
+
+
+def nothing(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
+    raise AssertionError("no frame is painted here")
+
+
+def test_a_model_tells_all_of_a_named_field_that_it_is_conditioned_on(
+    model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / MODEL_NAME
+    with monkeypatch.context() as patch:
+        patch.setattr(conditioning, "_KNOWN", dict(conditioning._KNOWN))
+        register_conditioning(Conditioning.of_field("heat", width=2, scale=300))
+        config = replace(model.rule.config, conditioning=("heat",))
+        Model(Rule.initial(config, model.rule.scales, seed=1)).save(path)
+    monkeypatch.setattr(conditioning, "_KNOWN", dict(conditioning._KNOWN))
+    assert Model.load(path).rule.config == config  # by a program that has never heard of it
+    assert conditioning.conditioning_named("heat").scale == 300
+    register_conditioning(Conditioning.of_field("heat", width=2, scale=1))
+    with pytest.raises(ModelError, match=r"known by that name is .*'heat', 2, 1"):
+        Model.load(path)
+
+
+@pytest.mark.parametrize(
+    "listed",
+    [
+        3,
+        "position",
+        [["position"]],
+        [[3, 3]],
+        [["density", 1.0]],
+        [["density", 1]] * 2,
+        [["heat", 1, 0]],
+        [["heat", 1, "2"]],
+        [["heat", 1, 2, 3]],
+        [["heat", 0, 2]],
+    ],
+)
+def test_a_list_of_inputs_that_is_none_is_damage(
+    model: Model, tmp_path: Path, listed: object
+) -> None:
+    model.save(tmp_path / MODEL_NAME)
+    rewritten(tmp_path / MODEL_NAME, conditioning=listed)
+    with pytest.raises(ModelError, match="damaged"):
+        Model.load(tmp_path)

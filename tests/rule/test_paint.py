@@ -8,9 +8,8 @@ import pytest
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import BackendUnavailableError
 from vnca.core.typing import FloatArray
-from vnca.engine.domain import Border, Domain
+from vnca.engine.domain import Border, Domain, subdivided
 from vnca.engine.native import step as native
-from vnca.engine.subdivision import subdivided
 from vnca.rule.decoder import Decoder
 from vnca.rule.paint import Between, colours, density_factors
 from vnca.rule.rule import Rule, RuleConfig, Scales
@@ -126,6 +125,16 @@ def test_a_backend_that_cannot_run_is_refused() -> None:
         patch.setattr(native, "_reason", "no compiler", raising=False)
         with pytest.raises(BackendUnavailableError, match="native cannot run"):
             Between(rule(), "native")
+
+
+@pytest.mark.parametrize(("backend", "same"), [("triton", "auto"), ("reference", "numpy")])
+def test_where_the_automaton_computes_on_tensors_arrays_are_decoded(
+    backend: str, same: str
+) -> None:
+    cells = domain()
+    at = cells.corners(cells.cells + 0.25)
+    seen, expected = (Between(rule(), one).at(state_of(cells), *at) for one in (backend, same))
+    np.testing.assert_array_equal(seen, expected)
 
 
 def test_nothing_lives_nowhere() -> None:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from vnca import simulation
 from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.volume import Volume
-from vnca.simulation import scenes
-from vnca.simulation.scenes import SCENES, simulate
+from vnca.simulation import SCENES, simulate
 
 RESOLUTION = 20
 FRAMES = 24
@@ -91,6 +91,6 @@ def test_impossible_requests_say_what_is_expected(
 
 
 def test_without_scipy_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scenes, "find_spec", lambda name: None)
+    monkeypatch.setattr(simulation, "find_spec", lambda name: None)
     with pytest.raises(BackendUnavailableError, match=r"pip install 'vnca\[train\]'"):
         simulate("plume", resolution=16, frames=1, seed=0)

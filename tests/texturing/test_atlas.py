@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from vnca.core.errors import BackendUnavailableError, GridError
-from vnca.io.mesh.mesh import Mesh, read_mesh
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import Unwrapping
-from vnca.meshes.unwrap import GUTTER, texel_map, unwrapped
+from vnca.meshes.atlas import GUTTER, texel_map, unwrapped
 
 
 def opened(tmp_path: Path, mesh: trimesh.Trimesh) -> Mesh:

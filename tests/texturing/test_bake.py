@@ -7,11 +7,10 @@ from PIL import Image
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
-from vnca.io.mesh.mesh import Mesh, read_mesh
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import BaseColour
-from vnca.meshes.bake import Placement, bake, fill, to_png
+from vnca.meshes.atlas import Placement, TexelMap, bake, fill, to_png, unwrapped
 from vnca.meshes.turntable import read_picture
-from vnca.meshes.unwrap import TexelMap, unwrapped
 from vnca.painting.block import Block, sample_block
 
 

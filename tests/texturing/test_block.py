@@ -7,7 +7,7 @@ from scipy.ndimage import map_coordinates
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import FloatArray
-from vnca.engine.backend import open_session
+from vnca.engine.session import open_session
 from vnca.painting.block import Block, block_domain, border_jump, grow, sample_block
 from vnca.painting.parts import SAMPLES
 from vnca.rule.rule import Rule

@@ -4,7 +4,7 @@ import pytest
 from vnca.core.typing import FloatArray
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceLoss
-from vnca.metrics.slice_distance import slice_distances
+from vnca.metrics.style_score import slice_distances
 from vnca.training.texture_config import TextureConfig
 
 

@@ -6,7 +6,7 @@ import pytest
 import torch
 import trimesh
 
-from vnca.io.mesh.mesh import read_mesh
+from vnca.io.mesh import read_mesh
 from vnca.rule.decoder import Decoder
 from vnca.rule.paint import Between
 from vnca.rule.rule import Rule, RuleConfig, Scales

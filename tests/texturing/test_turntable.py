@@ -8,11 +8,10 @@ import trimesh
 from vnca.core.errors import OptionError
 from vnca.core.shot import parse_colour
 from vnca.core.typing import FloatArray
-from vnca.io.mesh.mesh import read_mesh
+from vnca.io.mesh import read_mesh
 from vnca.io.mesh.texture import put_on
-from vnca.meshes.bake import Placement, bake, to_png
+from vnca.meshes.atlas import Placement, bake, to_png, unwrapped
 from vnca.meshes.turntable import Turntable, TurntableConfig, solid, textured
-from vnca.meshes.unwrap import unwrapped
 from vnca.painting.block import Block
 
 FILM = TurntableConfig(rows=48, columns=64, frames=4)

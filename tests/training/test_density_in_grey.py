@@ -11,7 +11,7 @@ from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
-from vnca.losses.pixels import luma
+from vnca.losses.terms import luma
 from vnca.rule.rule import DENSITY_CHANGE, Rule, RuleConfig
 from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
 from vnca.training.smoke_config import SmokeConfig, ViewConfig

@@ -9,9 +9,8 @@ import torch
 from torch import Tensor
 
 from vnca.core.typing import AnyArray, BoolArray, FloatArray, Index, IntArray
+from vnca.engine.automaton import FILTERS, changing_rows
 from vnca.engine.domain import Domain
-from vnca.engine.mask import changing_rows
-from vnca.engine.stencil import FILTERS
 from vnca.rule.rule import PRIORS
 
 CHANNELS, PROBABILITY = 12, 0.5

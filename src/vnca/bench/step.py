@@ -6,24 +6,27 @@ read or write at least. What a backend does beyond that, in cells that the mask 
 compute a hidden layer again, lowers its shares.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import torch
 
-from vnca.bench.agreement import Difference, require_agreement
 from vnca.bench.cases import CHANNELS, Case, Place
 from vnca.bench.contenders import DTYPES, PASSES, Contender, available, contender, require
-from vnca.bench.machine import run_facts
-from vnca.bench.memory import peak_mb
-from vnca.bench.peaks import copying, gemm
-from vnca.bench.timing import Spread, in_turns
+from vnca.bench.measurement import (
+    Difference,
+    Spread,
+    in_turns,
+    peak_mb,
+    require_agreement,
+    run_facts,
+)
 from vnca.core.errors import OptionError
 from vnca.core.typing import Index
+from vnca.engine.automaton import NEIGHBOURS
 from vnca.engine.native.step import default_threads
-from vnca.engine.stencil import NEIGHBOURS
 from vnca.rule.rule import PRIORS
 
 ARRAYS = ("state", "gradient of the state", "gradient of W1", "gradient of b1", "gradient of W2")
@@ -37,6 +40,36 @@ TOLERANCES = {
 hidden unit so near zero that rounding turns it on or off changes them by a jump."""
 _GEMMS = 4
 """Matrix products a repeat: the peak is the best of all."""
+
+
+class Peak(NamedTuple):
+    """Work that nothing on the machine does faster.
+
+    Attributes:
+        work: One call of it.
+        amount: Floating-point operations, or bytes read and written.
+    """
+
+    work: Callable[[], object]
+    amount: float
+
+    def begin(self) -> Callable[[], object]:
+        """Nothing has to be done before."""
+        return self.work
+
+
+def gemm(place: Place) -> Peak:
+    """A product of square matrices."""
+    size = 1024 if place.device == "cpu" else 8192
+    left, right, product = (place.tensor(torch.rand(size, size)) for _ in range(3))
+    return Peak(lambda: torch.mm(left, right, out=product), 2.0 * size**3)
+
+
+def copying(place: Place) -> Peak:
+    """A copy between two arrays that no cache holds."""
+    size = 1 << (27 if place.device == "cpu" else 30)
+    source, target = (torch.ones(size, dtype=torch.uint8, device=place.device) for _ in range(2))
+    return Peak(lambda: target.copy_(source), 2.0 * size)
 
 
 @dataclass(frozen=True)

@@ -11,25 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from vnca.bench.agreement import Difference, require_agreement
-from vnca.bench.memory import peak_mb
-from vnca.bench.timing import Spread, in_turns
+from vnca.bench.measurement import Difference, Spread, in_turns, peak_mb, require_agreement
 from vnca.core.errors import BackendUnavailableError
 from vnca.core.lattice import Lattice
 from vnca.core.typing import Box, FloatArray
 from vnca.core.volume import Volume
-from vnca.engine.backend import choose
-from vnca.engine.session import Compute
-from vnca.io.orientation import on_one_lattice
+from vnca.engine.session import Compute, choose
 from vnca.io.sequence import FrameSequence, find_frames
 from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
+from vnca.io.smoke_format import on_one_lattice
 from vnca.painting.config import StylizeConfig
 from vnca.painting.painter import Painter
 from vnca.painting.roll import Roll
 from vnca.painting.still import StillSmoke
 from vnca.painting.thin import require_dense
 from vnca.rule.rule import Rule, RuleConfig, Scales
-from vnca.simulation.scenes import simulate
+from vnca.simulation import simulate
 
 BACKENDS = ("native", "numpy")
 TOLERANCES: dict[str, float] = {"float32": 1e-3, "bfloat16": 5e-2}

@@ -13,10 +13,8 @@ from typing import Any
 
 import torch
 
-from vnca.bench.agreement import Difference, require_agreement
-from vnca.bench.memory import peak_mb
-from vnca.bench.plain import PlainUpdate
-from vnca.bench.timing import Spread
+from vnca.bench.contenders import PlainUpdate
+from vnca.bench.measurement import Difference, Spread, peak_mb, require_agreement
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.session import StepSession

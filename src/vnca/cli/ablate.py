@@ -19,9 +19,10 @@ from vnca.core.volume import Volume
 from vnca.features.load import load_network
 from vnca.io.picture import read_image
 from vnca.io.smoke import SmokeFormat, missing_velocity
-from vnca.metrics.estimators import Estimator, estimators
 from vnca.metrics.motion import (
+    Estimator,
     MotionMeasures,
+    estimators,
     measure_carried_noise,
     measure_drift,
     measure_motion,

@@ -13,8 +13,7 @@ from typing import Any, TypeVar, get_args
 
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
-from vnca.bench.machine import run_facts
-from vnca.bench.records import append_csv, write_json
+from vnca.bench.measurement import append_csv, run_facts, write_json
 from vnca.bench.stylize import (
     BACKENDS,
     PaintedSequence,
@@ -28,9 +27,8 @@ from vnca.cli.terminal import Terminal, say
 from vnca.core.errors import OptionError
 from vnca.core.files import writable_file
 from vnca.core.typing import Index
-from vnca.engine.backend import choose
 from vnca.engine.native.step import default_threads
-from vnca.engine.session import Compute
+from vnca.engine.session import Compute, choose
 from vnca.io.smoke import SmokeFormat, with_fitted_scale
 from vnca.recipe.sequence import open_sequence
 from vnca.rule.model import Model

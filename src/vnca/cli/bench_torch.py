@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 
 from vnca.bench.contenders import available, require
-from vnca.bench.machine import run_facts
+from vnca.bench.measurement import run_facts
 from vnca.bench.step import TOLERANCES, StepConfig, StepRun, measure_steps, prepare
 from vnca.bench.train import Training, measure_training
 from vnca.cli.bench import Rows, Tables, parse_bench, short
@@ -24,7 +24,7 @@ from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY
 from vnca.recipe.sequence import beside, read_alone
 from vnca.recipe.session import choose_device
-from vnca.simulation.scenes import simulate
+from vnca.simulation import simulate
 from vnca.training.memory import memory_budget
 from vnca.training.presets import DEFAULT, preset
 from vnca.training.smoke_config import SmokeConfig

@@ -10,8 +10,8 @@ from vnca.cli.options import parse
 from vnca.cli.terminal import Terminal, say
 from vnca.core.typing import FloatArray
 from vnca.core.watch import Watch
+from vnca.io.film import contact_sheet
 from vnca.io.picture import fit, read_style, write_image
-from vnca.io.sheet import contact_sheet
 from vnca.recipe.film import FilmConfig
 from vnca.recipe.rendering import RenderRun, strip
 from vnca.recipe.sequence import open_sequence

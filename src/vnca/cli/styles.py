@@ -13,8 +13,8 @@ from vnca.cli.terminal import made
 from vnca.core.colour import srgb_to_linear
 from vnca.core.files import writable_file
 from vnca.core.typing import FloatArray
+from vnca.io.film import contact_sheet
 from vnca.io.picture import fit, write_image
-from vnca.io.sheet import contact_sheet
 from vnca.rule.library import load_style, style_names, style_thumbnail
 
 SIZE = 160

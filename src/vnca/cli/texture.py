@@ -19,15 +19,14 @@ from vnca.core.typing import FloatArray
 from vnca.engine.session import Compute
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.film import FilmWriter
-from vnca.io.mesh.mesh import Mesh, read_mesh
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import put_on, write_coloured
-from vnca.io.orientation import UpAxis
 from vnca.io.picture import SUFFIXES as PICTURES
 from vnca.io.picture import to_srgb8, write_image
+from vnca.io.smoke_format import UpAxis
 from vnca.io.vdb import Grid, Transform, write_vdb
-from vnca.meshes.bake import Placement, bake, to_png
+from vnca.meshes.atlas import Placement, Unwrap, bake, to_png, unwrapped
 from vnca.meshes.turntable import Shader, Turntable, TurntableConfig, solid, textured
-from vnca.meshes.unwrap import Unwrap, unwrapped
 from vnca.painting.block import KIND, LARGEST, SMALLEST, Block, grow
 from vnca.painting.parts import require_refinement
 from vnca.rule.model import Model

@@ -13,9 +13,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vnca.core.bricks.field import Field
-from vnca.core.bricks.places import CELLS, EDGE, bricks_reached
+from vnca.core.bricks import CELLS, EDGE, bricks_reached
 from vnca.core.errors import GridError
+from vnca.core.field import Field
 from vnca.core.typing import AnyArray, Box, FloatArray, Index
 
 Beyond = Literal["nothing", "nearest"]

@@ -1,16 +1,76 @@
 """One frame of smoke, whatever file it came from."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from vnca.core.bricks.dense import dense, field_of, shape_of
-from vnca.core.bricks.field import Field
-from vnca.core.bricks.refinement import refined
 from vnca.core.errors import ShapeError
+from vnca.core.field import Field, refined
 from vnca.core.typing import AnyArray, Box, FloatArray, Index
+
+T = TypeVar("T")
+
+
+def dense(*names: str, what: Callable[[Any], str]) -> Callable[[type[T]], type[T]]:
+    """A decorator for dataclasses: what some attributes hold may be fields.
+
+    Read, those are arrays all the same, each made the first time; `field_of` gives the field.
+
+    Args:
+        names: Of the attributes.
+        what: What a message calls an instance whose arrays are too large.
+    """
+
+    def decorated(kind: type[T]) -> type[T]:
+        for name in names:
+            setattr(kind, name, _Dense(name, what))
+        return kind
+
+    return decorated
+
+
+def field_of(instance: object, name: str, origin: Index, *, outside: float = 0) -> Any:
+    """What such an attribute holds, as a field; None where that is what it holds.
+
+    Args:
+        instance: Whose attribute.
+        name: Its name.
+        origin: Index coordinates of the first cell, if it is an array.
+        outside: The most frequent value, if it is an array.
+    """
+    held = instance.__dict__[name]
+    if held is None or isinstance(held, Field):
+        return held
+    return Field.from_dense(held, origin, outside=outside)
+
+
+def shape_of(instance: object, name: str) -> tuple[int, ...] | None:
+    """The shape of such an attribute, which is not made an array for that; None of None."""
+    held = instance.__dict__[name]
+    return None if held is None else held.shape
+
+
+class _Dense:
+    def __init__(self, name: str, what: Callable[[Any], str]) -> None:
+        self._name = name
+        self._what = what
+
+    def __get__(self, instance: Any, owner: type) -> Any:
+        if instance is None:
+            return self
+        held = instance.__dict__[self._name]
+        if not isinstance(held, Field):
+            return held
+        made = f"{self._name} as an array"
+        if made not in instance.__dict__:
+            instance.__dict__[made] = held.dense(what=self._what(instance))
+        return instance.__dict__[made]
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        instance.__dict__[self._name] = value
 
 
 @dense("density", "velocity", what=lambda smoke: f"frame {smoke.frame}")
@@ -30,6 +90,8 @@ class Volume:
         index_to_world: 4×4, `world = index_to_world @ (i, j, k, 1)` for cell centres. The world is
             the file's, turned so that up is +z where it is another axis.
         frame: Frame number in its sequence.
+        fields: What else there is at the cells, by name, such as a temperature: numbers, each an
+            array `[x, y, z]` or `[x, y, z, c]`, or a field. A rule can be conditioned on them.
     """
 
     density: FloatArray
@@ -37,6 +99,7 @@ class Volume:
     origin: Index
     index_to_world: AnyArray
     frame: int
+    fields: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         density, velocity = shape_of(self, "density"), shape_of(self, "velocity")
@@ -46,15 +109,26 @@ class Volume:
             raise ShapeError(
                 f"velocity: expected {(*density, 3)} to match the density, got {velocity}"
             )
+        for name, values in self.fields.items():
+            if values.shape[:3] != density or len(values.shape) > 4:
+                raise ShapeError(
+                    f"fields: {name}: expected {density} to match the density, perhaps with a last "
+                    f"axis of components, got {values.shape}"
+                )
 
     @classmethod
     def of_fields(
-        cls, density: Field, velocity: Field | None, index_to_world: AnyArray, frame: int
+        cls,
+        density: Field,
+        velocity: Field | None,
+        index_to_world: AnyArray,
+        frame: int,
+        fields: Mapping[str, Field] | None = None,
     ) -> "Volume":
-        """Smoke given by where there is any; both fields cover one box."""
+        """Smoke given by where there is any; all fields cover one box."""
         smoke: Any = density
         motion: Any = velocity
-        return cls(smoke, motion, density.origin, index_to_world, frame)
+        return cls(smoke, motion, density.origin, index_to_world, frame, fields or {})
 
     @property
     def box(self) -> Box:
@@ -72,6 +146,14 @@ class Volume:
     def velocity_field(self) -> Field | None:
         """The velocity where there is any."""
         return field_of(self, "velocity", self.origin)
+
+    @cached_property
+    def named_fields(self) -> Mapping[str, Field]:
+        """`fields`, each where it is not zero."""
+        return {
+            name: held if isinstance(held, Field) else Field.from_dense(held, self.origin)
+            for name, held in self.fields.items()
+        }
 
     @property
     def voxel_size(self) -> tuple[float, float, float]:
@@ -108,6 +190,7 @@ class Volume:
             velocity,
             refined_transform(self.index_to_world, factor),
             self.frame,
+            {name: refined(held, factor) for name, held in self.named_fields.items()},
         )
 
 

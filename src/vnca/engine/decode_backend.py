@@ -5,8 +5,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from vnca.core.typing import FloatArray
-from vnca.engine.backend import choose
-from vnca.engine.session import Compute
+from vnca.engine.session import Compute, choose
 
 
 def torch_decode(

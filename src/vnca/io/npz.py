@@ -20,14 +20,15 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
-from vnca.core.bricks.field import Field
-from vnca.core.errors import FileFormatError, GridError
+from vnca.core.errors import FileFormatError, GridError, OptionError
+from vnca.core.field import Field
 from vnca.core.files import existing_file
 from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.io.smoke_format import (
     NO_VELOCITY,
     NOT_WANTED,
     Extent,
+    Reader,
     SmokeFormat,
     StoredSmoke,
     StoredVelocity,
@@ -52,7 +53,10 @@ def read_npz_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
     Raises:
         FileFormatError: If a file is missing, truncated, or holds something else.
         GridError: If density and velocity differ in extent, or values are not finite.
+        OptionError: If further fields are asked for.
     """
+    if format.fields:
+        raise OptionError(f"`fields` {', '.join(format.fields)}: an npz file has none: {path}")
     density = read_npz_density(path)
     box = occupied_box(density)
     domain = Box((0, 0, 0), density.shape)
@@ -202,3 +206,6 @@ def _npy_member(path: Path) -> Iterator[tuple[IO[bytes], int]]:
     ) as error:
         reason = " ".join(str(error).split())
         raise FileFormatError(f"{path}: not a readable npz file ({reason})") from error
+
+
+READER = Reader(read_npz_smoke, npz_smoke_extent, where_npz_velocity_is, up_axis="y")

@@ -6,16 +6,23 @@ from pathlib import Path
 
 import numpy as np
 
-from vnca.core.bricks.field import Field
-from vnca.core.bricks.refinement import divided
 from vnca.core.errors import GridError, OptionError, OutputError, ShapeError
+from vnca.core.field import Field, divided
 from vnca.core.lattice import Lattice, Placement
 from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume, refined_transform
-from vnca.io.npz import read_npz_smoke
-from vnca.io.orientation import UpAxis, on_lattice, own_cells, upright_world
 from vnca.io.provenance import Provenance, without_provenance
-from vnca.io.smoke_format import CELLS_PER_FRAME, UNITS_METADATA, SmokeFormat, up_axis_of
+from vnca.io.smoke_format import (
+    CELLS_PER_FRAME,
+    UNITS_METADATA,
+    SmokeFormat,
+    UpAxis,
+    on_lattice,
+    own_cells,
+    reader_of,
+    up_axis_of,
+    upright_world,
+)
 from vnca.io.vdb import VALUE_TYPES, Entry, Grid, GridHeader, Transform, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
@@ -86,7 +93,7 @@ def write_painted(
     if not isinstance(colour, Field):
         colour = Field.from_dense(colour, box.lower)
     frame = _Painting(density, colour, lattice, up_axis_of(source, format), refine)
-    write = _paint_npz if source.suffix.lower() == ".npz" else _paint_vdb
+    write = _paint_vdb if source.suffix.lower() == ".vdb" else _paint_other
     write(path, source, format, frame, colour_grids, provenance.metadata if provenance else {})
 
 
@@ -276,7 +283,7 @@ def _paint_vdb(
         write_vdb(path, grids, metadata=about)
 
 
-def _paint_npz(
+def _paint_other(
     path: str | Path,
     source: str | Path,
     format: SmokeFormat,
@@ -284,7 +291,7 @@ def _paint_npz(
     colour_grids: Sequence[str],
     told: Mapping[str, Entry],
 ) -> None:
-    stored = read_npz_smoke(Path(source), format)
+    stored = reader_of(Path(source)).read(Path(source), format)
     transform = Transform.from_matrix(stored.index_to_world)
     before = stored.density
     density, colour = frame.in_file(transform, before, str(source))
@@ -310,6 +317,7 @@ def _paint_npz(
                 velocity.stored,
                 transform=transform,
                 grid_class="staggered" if all(velocity.staggered) else None,
+                metadata={UNITS_METADATA: CELLS_PER_FRAME} if velocity.in_cells_per_frame else {},
             )
         )
     write_vdb(path, grids, metadata=told)

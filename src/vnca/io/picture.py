@@ -21,8 +21,7 @@ from vnca.core.colour import linear_to_srgb, luminance, srgb_to_linear
 from vnca.core.errors import FileFormatError, OptionError, ShapeError, VncaError
 from vnca.core.files import existing_file, whole_file
 from vnca.core.typing import AnyArray, FloatArray
-from vnca.io import exr, hdr
-from vnca.io.exr import write_exr
+from vnca.io.linear_picture import EXR_MAGIC, HDR_MAGICS, read_exr, read_hdr, write_exr
 
 _ENCODERS: dict[str, tuple[str, dict[str, Any]]] = {
     ".png": ("PNG", {}),
@@ -222,13 +221,13 @@ def _read(path: Path) -> tuple[FloatArray, FloatArray | None]:
 
 def _decoded(path: Path, data: bytes) -> tuple[FloatArray, FloatArray | None]:
     most = Image.MAX_IMAGE_PIXELS or 2**63
-    if data.startswith(exr.MAGIC):
-        colour, alpha = exr.read_exr(path, most)
+    if data.startswith(EXR_MAGIC):
+        colour, alpha = read_exr(path, most)
         if alpha is not None:
             alpha = np.clip(np.nan_to_num(alpha, nan=0.0), 0, 1)
         return _exposed(path, colour), alpha
-    if data.startswith(hdr.MAGICS):
-        return _exposed(path, hdr.read_hdr(path, data, most)), None
+    if data.startswith(HDR_MAGICS):
+        return _exposed(path, read_hdr(path, data, most)), None
     with warnings.catch_warnings():
         warnings.simplefilter("error", Image.DecompressionBombWarning)
         warnings.filterwarnings("ignore", category=UserWarning, module="PIL")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vnca.core.errors import FileFormatError
-from vnca.io.orientation import UpAxis
+from vnca.io.smoke_format import UpAxis
 from vnca.io.vdb import Metadata, open_vdb
 
 PREFIX = "vnca_"

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import NamedTuple, overload
 
 from vnca.core.errors import OptionError, SequenceError
-from vnca.io.smoke_format import UP_AXES
+from vnca.io.smoke_format import suffixes
 
 MAX_FRAMES = 1_000_000
 _NUMBER = re.compile(r"%0?(?P<printf>\d*)d|\$F(?P<houdini>\d*)|(?P<hashes>#+)")
@@ -213,7 +213,7 @@ def _is_minus_after(before: str, written: Sequence[str]) -> bool:
 
 def _folder_sequences(folder: Path) -> dict[str, _Found]:
     """Sequences in a folder; Mantaflow's `d/` counts as one where nothing else is there."""
-    files = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in UP_AXES]
+    files = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in suffixes()]
     sequences = _sequences(files)
     if not sequences and (folder / "d").is_dir():
         sequences = _sequences(sorted((folder / "d").glob("*.npz")))

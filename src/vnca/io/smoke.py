@@ -1,33 +1,39 @@
 """Smoke in and out: a frame's density and velocity, whatever file holds them.
 
-The format is chosen by suffix; a new one needs a `Reader` here and an axis in `UP_AXES`.
+The format is chosen by suffix; `smoke_format.py` has the registry.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from statistics import median
 
 import numpy as np
 
-from vnca.core.bricks.field import Field
 from vnca.core.errors import FileFormatError, GridError, OptionError, SequenceError
+from vnca.core.field import Field
 from vnca.core.files import existing_file
 from vnca.core.lattice import Lattice, Placement
 from vnca.core.typing import AnyArray, Box
 from vnca.core.volume import Volume
-from vnca.io.npz import npz_smoke_extent, read_npz_smoke, where_npz_velocity_is
-from vnca.io.orientation import on_lattice, own_cells, upright_world
 from vnca.io.painted import write_painted, write_smoke
 from vnca.io.sequence import Frame
-from vnca.io.smoke_format import Extent, SmokeFormat, StoredSmoke, StoredVelocity, up_axis_of
-from vnca.io.vdb_smoke import read_vdb_smoke, vdb_smoke_extent, where_vdb_velocity_is
+from vnca.io.smoke_format import (
+    Extent,
+    Reader,
+    SmokeFormat,
+    StoredSmoke,
+    StoredVelocity,
+    on_lattice,
+    own_cells,
+    reader_of,
+    up_axis_of,
+    upright_world,
+)
 from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
 
 __all__ = [
-    "READERS",
-    "Reader",
     "SmokeFormat",
     "missing_velocity",
     "read_smoke",
@@ -47,26 +53,7 @@ FASTEST = 1e20
 _FITTED_PAIRS = 3
 
 
-@dataclass(frozen=True)
-class Reader:
-    """A file format that holds smoke.
-
-    Attributes:
-        read: Reads a frame in the axes of its file.
-        extent: The cells that hold smoke, in the axes of the file.
-        where_velocity_is: What to tell whoever expected velocity in a frame that has none.
-    """
-
-    read: Callable[[Path, SmokeFormat], StoredSmoke]
-    extent: Callable[[Path, SmokeFormat], Extent]
-    where_velocity_is: Callable[[Path], str]
-
-
 _ANY = SmokeFormat()
-READERS = {
-    ".vdb": Reader(read_vdb_smoke, vdb_smoke_extent, where_vdb_velocity_is),
-    ".npz": Reader(read_npz_smoke, npz_smoke_extent, where_npz_velocity_is),
-}
 
 
 def read_smoke(
@@ -98,7 +85,8 @@ def read_smoke(
     if velocity is not None:
         velocity = place.field(velocity)
         velocity = replace(velocity, values=place.vectors(velocity.values))
-    smoke = Volume.of_fields(place.field(density), velocity, index_to_world, frame)
+    fields = {name: place.field(held) for name, held in stored.fields.items()}
+    smoke = Volume.of_fields(place.field(density), velocity, index_to_world, frame, fields)
     return smoke if lattice is None else on_lattice(smoke, lattice, place.what)
 
 
@@ -190,13 +178,7 @@ def _named(path: Path, format: SmokeFormat) -> str:
 
 
 def _reader(path: Path) -> Reader:
-    path = existing_file(path)
-    try:
-        return READERS[path.suffix.lower()]
-    except KeyError:
-        raise FileFormatError(
-            f"{path}: expected a file of smoke ({', '.join(READERS)}), got {path.suffix or 'none'}"
-        ) from None
+    return reader_of(existing_file(path))
 
 
 def _non_negative(density: Field, path: Path) -> Field:

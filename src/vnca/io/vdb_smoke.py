@@ -5,15 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from vnca.core.bricks.field import Field
-from vnca.core.bricks.places import bricks_beside, sorted_bricks
+from vnca.core.bricks import bricks_beside, sorted_bricks
 from vnca.core.errors import FileFormatError, GridError
+from vnca.core.field import Field
 from vnca.core.typing import Box, IntArray
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
     NOT_WANTED,
     UNITS_METADATA,
     Extent,
+    Reader,
     SmokeFormat,
     StoredSmoke,
     StoredVelocity,
@@ -21,8 +22,7 @@ from vnca.io.smoke_format import (
     upper_grown,
 )
 from vnca.io.vdb import EMPTY_BOX, Grid, GridHeader, Transform, VdbFile, open_vdb
-from vnca.io.vdb_grids import components, listed_vectors, velocity_headers
-from vnca.io.vdb_velocity import resampled_velocity
+from vnca.io.vdb_velocity import components, listed_vectors, resampled_velocity, velocity_headers
 
 _CELL_TOLERANCE = 1e-3
 # A small file may hold 512³ cells, in tiles or packed well, one of 500 KB 2³¹.
@@ -49,6 +49,7 @@ def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
             density,
             header.transform.index_to_world,
             _read_velocity(file, format, density, header.transform),
+            {name: _read_field(file, name, density, header.transform) for name in format.fields},
         )
 
 
@@ -120,6 +121,27 @@ def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, 
             "make inactive what is no smoke, or resample the grid"
         )
     return header, grid, box
+
+
+def _read_field(file: VdbFile, name: str, density: Field, place: Transform) -> Field:
+    """A further grid of numbers at the cells of the density, zero where it is inactive.
+
+    Raises:
+        GridError: If it is missing, holds no numbers, or has other cells.
+    """
+    if name not in file.names:
+        raise GridError(f"{file.path}: no grid {name!r}; choose `fields` from {file.listed()}")
+    header = file.grids[name]
+    label = f"{file.path}: grid {name!r}"
+    if components(header) != 1:
+        raise GridError(f"{label} holds {header.value_type}, expected numbers; see `fields`")
+    ours, theirs = (each.index_to_world for each in (place, header.transform))
+    if not np.allclose(np.linalg.solve(ours, theirs), np.eye(4), atol=_CELL_TOLERANCE):
+        raise GridError(
+            f"{label} has other cells than the density; resample it onto those, or leave it out of "
+            "`fields`"
+        )
+    return _finite(header, header.read(), density.box, near=density.bricks)[0]
 
 
 def _read_velocity(
@@ -206,3 +228,6 @@ def _finite(
 
 def _extent(box: Box) -> str:
     return f"cells {box.lower} to {box.upper}"
+
+
+READER = Reader(read_vdb_smoke, vdb_smoke_extent, where_vdb_velocity_is, up_axis="z")

@@ -14,9 +14,15 @@ from vnca.core.errors import OptionError, ShapeError
 from vnca.core.typing import FloatArray
 from vnca.features.network import FeatureNetwork
 from vnca.features.strokes import picture_cells
-from vnca.losses.moments import Moments, moment_distance, moments
-from vnca.losses.pixels import luma, palette_distance
-from vnca.losses.style import sample_positions, style_distance
+from vnca.losses.terms import (
+    Moments,
+    luma,
+    moment_distance,
+    moments,
+    palette_distance,
+    sample_positions,
+    style_distance,
+)
 from vnca.rendering.colour import linear_to_srgb
 
 

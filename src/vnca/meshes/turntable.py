@@ -9,9 +9,9 @@ from vnca.core.camera import Orthographic, view_axes
 from vnca.core.errors import OptionError
 from vnca.core.shot import Shot, parse_colour
 from vnca.core.typing import AnyArray, FloatArray
-from vnca.io.mesh.mesh import Mesh
+from vnca.io.mesh import Mesh
 from vnca.io.mesh.texture import BaseColour, base_colours
-from vnca.meshes.bake import Placement
+from vnca.meshes.atlas import Placement
 from vnca.meshes.raster import visible
 from vnca.painting.block import Block
 

@@ -1,25 +1,27 @@
-"""How well a painted texture moves with the smoke it lies on.
+"""How well a painted texture moves with the smoke it lies on, as estimators of optical flow see it.
 
 The density stays that of one frame, so that whatever moves in the pictures is texture.
 """
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import importlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, TypeAlias
 
 import numpy as np
 import torch
 from scipy.ndimage import gaussian_filter
 from torch import Tensor
 
-from vnca.core.errors import GridError
+from vnca.core.errors import BackendUnavailableError, GridError
 from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.session import Compute
+from vnca.features.flow import FlowNetwork
 from vnca.losses.motion import MotionConfig, compare_motion, supervised
-from vnca.losses.pixels import luma
-from vnca.metrics.estimators import Estimator
+from vnca.losses.terms import luma
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import Roll
 from vnca.rendering.colour import linear_to_srgb
@@ -28,10 +30,95 @@ from vnca.rule.rule import COLOUR, Rule
 from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
 from vnca.training.smoke_config import ViewConfig
 
+Estimator: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
+"""Grey pictures `[row, column]` before and after, as displayed (sRGB, 0–1), to pixels moved,
+`[row, column, (right, down)]`, at the pixels of the first."""
 AZIMUTHS = (0.0, 60.0, 120.0, 180.0, 240.0, 300.0)
 """Degrees around the smoke at which motion is measured."""
 ELEVATION = 10.0
 """Degrees above the horizon."""
+
+
+def estimators() -> Mapping[str, Estimator]:
+    """What sees motion: the network that training uses, and one it never meets.
+
+    Raises:
+        BackendUnavailableError: If OpenCV is not installed.
+        FileFormatError: If the network's weights are missing or damaged.
+    """
+    return {"network": ours(), "dis": dis()}
+
+
+def ours(device: str = "cpu") -> Estimator:
+    """The network that training uses.
+
+    Raises:
+        FileFormatError: If its weights are missing or damaged.
+    """
+    return estimator_of(FlowNetwork.load(device))
+
+
+def estimator_of(network: FlowNetwork) -> Estimator:
+    """A flow network called like the others."""
+    device = next(network.parameters()).device
+
+    def estimate(before: FloatArray, after: FloatArray) -> FloatArray:
+        pair = torch.from_numpy(np.stack([before, after])[:, None]).float().to(device)
+        with torch.no_grad():
+            flow = network(pair[0], pair[1])[0]
+        return np.ascontiguousarray(flow.permute(1, 2, 0).cpu().numpy())
+
+    return estimate
+
+
+def dis() -> Estimator:
+    """Dense inverse search, preset "medium", down to single pixels.
+
+    Raises:
+        BackendUnavailableError: If OpenCV is not installed.
+
+    Reference: Kroeger et al. 2016.
+    """
+    cv2 = _opencv()
+    search = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    search.setFinestScale(0)
+
+    def estimate(before: FloatArray, after: FloatArray) -> FloatArray:
+        return search.calc(_bytes(before), _bytes(after), None)
+
+    return estimate
+
+
+def farneback() -> Estimator:
+    """Polynomial expansion, five halvings, windows of 15 pixels.
+
+    Raises:
+        BackendUnavailableError: If OpenCV is not installed.
+
+    Reference: Farnebäck 2003.
+    """
+    cv2 = _opencv()
+
+    def estimate(before: FloatArray, after: FloatArray) -> FloatArray:
+        return cv2.calcOpticalFlowFarneback(
+            _bytes(before), _bytes(after), None,
+            pyr_scale=0.5, levels=5, winsize=15, iterations=3, poly_n=5, poly_sigma=1.1, flags=0,
+        )  # fmt: skip
+
+    return estimate
+
+
+def _opencv() -> Any:
+    try:
+        return importlib.import_module("cv2")
+    except ImportError as error:
+        raise BackendUnavailableError(
+            "optical flow by OpenCV: it is not installed; pip install 'vnca[evaluate]'"
+        ) from error
+
+
+def _bytes(picture: FloatArray) -> np.ndarray:
+    return np.ascontiguousarray(np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8))
 
 
 @dataclass(frozen=True, eq=False)

@@ -130,7 +130,7 @@ class Setup:
                 box = box.union(smoke_bounds(smoke, rule.scales.density))
         if box.is_empty:
             raise GridError("there is no smoke in any frame; choose others")
-        return cls(box, rule.scales.gamma / rule.scales.density, size)
+        return cls(box, rule.scales.extinction(cell_length=1.0), size)
 
     def refined(self, factor: int) -> "Setup":
         """The same place on a grid `factor` times as fine along each axis."""

@@ -1,21 +1,32 @@
-"""How much the views of painted smoke look like the style picture."""
+"""How much views of painted smoke, or slices of a solid texture, look like the style picture.
+
+By measures that training never used, and in the eyes of frozen networks. One of these may be the
+network that the rule was trained to please, so there are several, and each says whether it is the
+one.
+"""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
+import torch
 
+from vnca.core.colour import linear_to_srgb
 from vnca.core.errors import GridError
-from vnca.core.typing import Box, FloatArray
+from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.session import Compute
-from vnca.io.orientation import on_one_lattice
+from vnca.features.network import SMALLEST, FeatureNetwork
+from vnca.io.smoke_format import on_one_lattice
+from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
 from vnca.metrics.setup import SIZE, Coloured, Pair, Setup, Viewpoint
 from vnca.metrics.style import StyleDistances, StyleMetric, gap_closed, mean_distances
 from vnca.painting.config import StylizeConfig
 from vnca.painting.roll import stylize
 from vnca.rule.rule import Rule
+from vnca.training.scenes.slices import FAMILIES, as_picture, shown, slice_points
 
 FEWEST_OPAQUE = 64
 """Opaque pixels without which a view says nothing about style."""
@@ -23,6 +34,125 @@ CUTOUTS = 3
 """Cut-outs of the picture for each view."""
 SIDES = tuple(Viewpoint(azimuth, 10.0) for azimuth in (0.0, 90.0, 180.0, 270.0))
 """From where frames of a sequence are compared with the picture."""
+_SEED = 0  # of the positions that judges compare, the same for all
+
+
+@dataclass
+class Judge:
+    """A network that compares what is opaque in views with the style picture.
+
+    Attributes:
+        name: What it is called.
+        trained_with: Whether the rule was trained with it; None if its file does not tell.
+        reason: Why it cannot judge, if it cannot.
+        shares: The share of the gap closed, by frame.
+    """
+
+    name: str
+    trained_with: bool | None
+    reason: str = ""
+    shares: dict[int, float] = field(default_factory=dict)
+    _loss: AppearanceLoss | None = None
+
+    @classmethod
+    def of(
+        cls, network: FeatureNetwork, trained_with: bool | None, metric: StyleMetric, size: int
+    ) -> "Judge":
+        """A judge of views.
+
+        Args:
+            network: What compares.
+            trained_with: Whether the rule was trained with it.
+            metric: Has the picture, as large as it is to be compared.
+            size: Rows and columns of the views.
+        """
+        shorter = min(metric.picture.shape[:2])
+        config = AppearanceConfig(pixels=0.0, grey=False, style_scale=shorter / size)
+        loss = AppearanceLoss(network, metric.picture, config, size)
+        return cls(network.name, trained_with, _loss=loss)
+
+    def look(self, frame: int, pairs: Sequence[Pair], metric: StyleMetric) -> None:
+        """Judge views of a frame, as `style_score` does by measures that never learned.
+
+        A view counts as far as both ways of the smoke are opaque in it.
+        """
+        pairs = [pair for pair in pairs if pair.where.any()]
+        if self._loss is None or not pairs:
+            return
+        behind = metric.background
+        painted, plain, cutout = (
+            float(np.mean([self._distance(*one) for one in some]))
+            for some in (
+                [(pair.painted.over(behind), pair.where) for pair in pairs],
+                [(pair.plain.over(behind), pair.where) for pair in pairs],
+                [
+                    part
+                    for seed, pair in enumerate(pairs)
+                    for part in metric.cutouts(pair.where, 1, seed)
+                ],
+            )
+        )
+        self.shares[frame] = gap_closed([painted], [plain], [cutout])
+
+    @torch.no_grad()
+    def _distance(self, picture: AnyArray, where: BoolArray) -> float:
+        """Styles and moments apart, summed over the layers."""
+        assert self._loss is not None
+        lacking = [(0, max(0, SMALLEST - side)) for side in where.shape]
+        encoded = linear_to_srgb(np.pad(picture, [*lacking, (0, 0)]).clip(0, 1)).astype(np.float32)
+        shown = torch.from_numpy(encoded).permute(2, 0, 1)[None]
+        opacity = torch.from_numpy(np.pad(where, lacking).astype(np.float32))[None]
+        # The same positions are drawn for all.
+        return float(self._loss(shown, opacity, torch.Generator().manual_seed(_SEED)).total)
+
+
+class SliceDistance(NamedTuple):
+    """Mean over slices of one family.
+
+    Attributes:
+        total: The appearance loss.
+        terms: Its parts, weighted.
+    """
+
+    total: float
+    terms: dict[str, float]
+
+
+def slice_distances(
+    block: FloatArray, appearance: AppearanceLoss, *, size: int, count: int = 16, seed: int = 0
+) -> dict[str, SliceDistance]:
+    """Mean appearance loss of fixed slices of a block, family by family.
+
+    The slices, and the positions compared in them, depend on nothing but the seed: blocks of
+    any size and origin are asked the same. Those named `unseen` lie where training never looks.
+
+    Args:
+        block: Linear RGB `[s, s, s, 3]`.
+        appearance: What judges; losses of different ones cannot be compared.
+        size: Rows and columns of a slice, pixels of a cell each.
+        count: Slices of a family.
+        seed: Chooses them.
+    """
+    values = torch.from_numpy(np.ascontiguousarray(block)).to(appearance.background.device)
+    found = {}
+    for family, draw in FAMILIES.items():
+        random = np.random.default_rng(seed)
+        generator = torch.Generator().manual_seed(seed)
+        losses = []
+        for _ in range(count):
+            middle = random.uniform(0, len(block), 3)
+            points = slice_points(draw(random), middle, size=size).to(values.device)
+            with torch.no_grad():
+                colour = shown(values, points)
+                losses.append(
+                    appearance(as_picture(colour), torch.ones_like(colour[None, ..., 0]), generator)
+                )
+        terms = {
+            name: float(np.mean([float(loss.terms[name]) for loss in losses]))
+            for name in losses[0].terms
+        }
+        found[family] = SliceDistance(float(np.mean([float(loss.total) for loss in losses])), terms)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

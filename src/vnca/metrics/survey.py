@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,18 +10,17 @@ from vnca.core.errors import GridError
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.metrics.coherence import Agreement, Coherence, Step, around
-from vnca.metrics.density import DensityChange
-from vnca.metrics.estimators import Estimator, estimators
-from vnca.metrics.judges import Judge
 from vnca.metrics.motion import (
+    Estimator,
     MotionMeasures,
+    estimators,
     measure_carried_noise,
     measure_drift,
     measure_motion,
 )
 from vnca.metrics.setup import Coloured, Pair, Setup, Viewpoint
 from vnca.metrics.style import StyleMetric
-from vnca.metrics.style_score import SIDES, StyleScore, joined_style_score, style_score
+from vnca.metrics.style_score import SIDES, Judge, StyleScore, joined_style_score, style_score
 from vnca.painting.roll import Painting
 from vnca.rule.rule import Rule
 
@@ -40,6 +40,30 @@ STRIP_FRAMES = 8
 """Frames of which pictures are kept."""
 MOTION_SIZE = 128
 """Rows and columns of the pictures in which motion is looked for."""
+
+
+class DensityChange(NamedTuple):
+    """How the density of a painted frame differs from that of the smoke.
+
+    Attributes:
+        moved: Σ|d' − d| / Σd: the share of the mass that is taken away or added.
+        mass_change: Σd' / Σd − 1: what this comes to in total.
+    """
+
+    moved: float
+    mass_change: float
+
+    @classmethod
+    def of(cls, painting: Painting) -> "DensityChange":
+        """That of a painted frame; nothing changes in one without smoke."""
+        before, after = (
+            density.astype(np.float64) for density in (painting.smoke.density, painting.density)
+        )
+        mass = before.sum() or 1.0
+        return cls(
+            moved=float(np.abs(after - before).sum() / mass),
+            mass_change=float((after.sum() - before.sum()) / mass),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,11 @@ import numpy as np
 
 from vnca.core.errors import OptionError
 from vnca.core.typing import AnyArray, FloatArray
-from vnca.engine.backend import open_session
 from vnca.engine.domain import Domain
-from vnca.engine.session import Compute
+from vnca.engine.session import Compute, open_session
 from vnca.painting.parts import colour_means, parts_of_cells, require_refinement
 from vnca.rule.paint import Between, colours
-from vnca.rule.rule import PRIORS, Rule
+from vnca.rule.rule import Rule
 
 SMALLEST, LARGEST = 8, 384
 """Cells along an edge."""
@@ -117,7 +116,7 @@ def grow(
     """Grow a block from nothing, and let it live on: one block after the other, without end.
 
     Args:
-        rule: Cells know nothing but their neighbourhood: its priors are zero here.
+        rule: Cells know nothing but their neighbourhood: its conditioning is zero here.
         size: Cells along an edge.
         steps: Steps before the first block.
         seed: Same seed, same machine, same block.
@@ -127,7 +126,7 @@ def grow(
     """
     compute = compute or Compute()
     domain = block_domain(size)
-    nothing = np.zeros((len(domain), PRIORS), np.float32)
+    nothing = np.zeros((len(domain), rule.config.conditioning_width), np.float32)
     session = open_session(rule.automaton(seed), domain, nothing, compute)
     between = Between(rule, compute.backend, threads=compute.threads)
     state = session.upload(domain.seed(rule.config.channels))

@@ -14,14 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from vnca.core.bricks.dense import dense, field_of
-from vnca.core.bricks.field import Field
+from vnca.core.field import Field
 from vnca.core.typing import Box, FloatArray, IntArray
-from vnca.core.volume import Volume
-from vnca.engine.backend import open_session
+from vnca.core.volume import Volume, dense, field_of
 from vnca.engine.domain import Domain, DomainKind
-from vnca.engine.session import Compute
-from vnca.io.orientation import on_one_lattice
+from vnca.engine.session import Compute, open_session
+from vnca.io.smoke_format import on_one_lattice
 from vnca.io.velocity import extrapolated
 from vnca.painting.config import StylizeConfig
 from vnca.painting.parts import colour_means, density_means, parts_of_cells

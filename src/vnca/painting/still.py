@@ -37,7 +37,7 @@ class StillSmoke:
         """
         if (
             self._is_told
-            or not self.rule.config.velocity_prior
+            or not self.rule.config.is_conditioned_on("velocity")
             or self.format.velocity_grid == NO_VELOCITY
             or smoke.velocity_field is not None
             or smoke.box.is_empty

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import vnca
-from vnca.bench.machine import run_facts
+from vnca.bench.measurement import run_facts
 from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import whole_file, writable_folder
 from vnca.core.lattice import Region
@@ -23,11 +23,11 @@ from vnca.io.picture import read_image, style_array
 from vnca.io.sequence import FrameSequence, format_frames
 from vnca.io.smoke import SmokeFormat, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY
-from vnca.metrics.judges import Judge
 from vnca.metrics.measures import Measure, measures
 from vnca.metrics.report import report
 from vnca.metrics.setup import SIZE, Setup
 from vnca.metrics.style import SMALLEST, StyleMetric
+from vnca.metrics.style_score import Judge
 from vnca.metrics.survey import Survey, survey
 from vnca.painting.config import StylizeConfig
 from vnca.painting.parts import require_refinement

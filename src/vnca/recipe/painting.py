@@ -15,8 +15,7 @@ from vnca.core.files import remove_leftovers, writable_file, writable_folder
 from vnca.core.records import changed_fields
 from vnca.core.volume import refined_transform
 from vnca.core.watch import Watch
-from vnca.engine.backend import choose
-from vnca.engine.session import Compute
+from vnca.engine.session import Compute, choose
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.painted import read_colour
 from vnca.io.provenance import read_provenance

@@ -17,15 +17,14 @@ from vnca.core.shot import parse_colour
 from vnca.core.typing import FloatArray
 from vnca.core.watch import SILENT, Watch, tracked
 from vnca.io.film import SUFFIXES as FILMS
-from vnca.io.orientation import UpAxis
+from vnca.io.film import contact_sheet
 from vnca.io.painted import read_colour
 from vnca.io.picture import SUFFIXES as PICTURES
 from vnca.io.picture import write_image
 from vnca.io.provenance import read_provenance
 from vnca.io.sequence import FrameSequence
-from vnca.io.sheet import contact_sheet
 from vnca.io.smoke import SmokeFormat
-from vnca.io.smoke_format import NO_VELOCITY
+from vnca.io.smoke_format import NO_VELOCITY, UpAxis
 from vnca.recipe.film import Bounds, Film, FilmConfig, Shown, picture
 from vnca.recipe.options import changed
 from vnca.recipe.sequence import open_sequence, region_bounds, sequence_bounds, volumes

@@ -16,10 +16,9 @@ from vnca.core.lattice import Lattice, Placement, Region
 from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.core.watch import Watch
-from vnca.io.orientation import on_lattice, on_one_lattice
 from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
 from vnca.io.smoke import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
-from vnca.io.smoke_format import NO_VELOCITY, Extent
+from vnca.io.smoke_format import NO_VELOCITY, Extent, on_lattice, on_one_lattice
 from vnca.painting.ahead import read_ahead
 from vnca.painting.painter import BROKEN
 from vnca.painting.still import StillSmoke
@@ -213,7 +212,7 @@ def placed(rule: Rule, region: Region, watch: Watch) -> Rule:
     A rule that is conditioned on position would else see the same position in all cells; a note
     says so.
     """
-    if rule.place is None or not rule.config.position_prior:
+    if rule.place is None or not rule.config.is_conditioned_on("position"):
         return rule
     there = rule.place.lattice.to_world
     place = Placement.between(region.lattice.to_world, there, region.box, "the sequence")

@@ -368,7 +368,7 @@ def graft(
         raise OptionError(f"{what}: {misfit}")
     if not goes_on:
         watch.note(f"starting from the rule of {name}")
-        trainer.begin_with(without_prior_weights(rule))
+        trainer.begin_with(without_prior_weights(rule, wanted.config.conditioning))
     return name
 
 

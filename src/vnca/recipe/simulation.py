@@ -10,7 +10,7 @@ from vnca.core.files import writable_folder
 from vnca.core.volume import Volume
 from vnca.core.watch import SILENT, Watch, tracked
 from vnca.io.smoke import write_smoke
-from vnca.simulation import scenes
+from vnca.simulation import simulate as simulated_frames
 
 Scene = Literal["plume", "jets", "ring"]
 
@@ -69,7 +69,7 @@ def simulate(
     )
     if run.out is not None:
         writable_folder(run.out)
-    volumes = scenes.simulate(scene, resolution=resolution, frames=frames, seed=seed)
+    volumes = simulated_frames(scene, resolution=resolution, frames=frames, seed=seed)
     return _written(tracked(volumes, watch, "simulating", frames, "frames"), run, watch)
 
 

@@ -15,10 +15,9 @@ from vnca.core.volume import Volume
 from vnca.core.watch import SILENT, Watch
 from vnca.features.load import load_network
 from vnca.features.network import FeatureNetwork
-from vnca.io.orientation import on_lattice
 from vnca.io.picture import read_style, style_array
 from vnca.io.smoke import SmokeFormat, missing_velocity
-from vnca.io.smoke_format import NO_VELOCITY
+from vnca.io.smoke_format import NO_VELOCITY, on_lattice
 from vnca.recipe import texture
 from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY, load
@@ -225,7 +224,9 @@ def run(
             checkpoint.require(session.inputs, folder.checkpoint_path)
         beginning = pretraining_config(config, trainer.picture_cells)
         if options.init is not None:
-            trainer.begin_with(without_prior_weights(rule_like(options.init, trainer.rule())))
+            wanted = trainer.rule()
+            begun = rule_like(options.init, wanted)
+            trainer.begin_with(without_prior_weights(begun, wanted.config.conditioning))
         elif beginning is not None:
             if checkpoint is None and options.overwrite and options.out is not None:
                 # Resuming must not take the texture of the run that was there for this one's.

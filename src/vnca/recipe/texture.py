@@ -9,9 +9,9 @@ import torch
 from vnca.core.typing import AnyArray, FloatArray
 from vnca.core.watch import SILENT, Watch
 from vnca.features.load import load_network
-from vnca.io.mesh.mesh import Mesh, read_mesh
-from vnca.io.orientation import UpAxis
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.picture import read_style, style_array
+from vnca.io.smoke_format import UpAxis
 from vnca.painting.block import KIND
 from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY

@@ -1,18 +1,23 @@
-"""What a cell is conditioned on beside its neighbourhood.
+"""What a rule is conditioned on beside its perception: a list of inputs by name.
 
 Reference: VNCA section 3.3, "Encoding Priors".
 """
 
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from vnca.core.errors import GridError, OptionError, ShapeError
 from vnca.core.lattice import Placement
 from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
-from vnca.rule.rule import PRIORS, Rule
 
-POSITION, DENSITY, VELOCITY = slice(0, 3), slice(3, 4), slice(4, 7)
-"""Which priors of a cell are which."""
+if TYPE_CHECKING:
+    from vnca.rule.rule import Rule
+
 SPEED_LIMIT = 2.0
 """No cell is conditioned on a normalised speed above this: training has hardly met faster smoke,
 and what a rule has not met it paints badly. Nor must a file in other units blow a state up."""
@@ -22,27 +27,135 @@ _SQUARABLE = 1e18
 """Single precision holds the square of it."""
 
 
-def priors(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
-    """Position, density and velocity `[n, 7]` at the cells of a domain.
+@dataclass(frozen=True)
+class Conditioning:
+    """One input of a rule: some numbers that every cell is told.
 
-    The position of a cell is (2i + 1)/H − 1, −1 to 1, in the box where the rule was trained; what
-    lies outside counts as at its border. Of a rule that does not know where that was, it is
-    the domain's box. Priors that the rule switches off, and velocity where the smoke has none, are
-    zero.
+    Attributes:
+        name: By which configurations and model files list it.
+        width: How many numbers a cell.
+        values: What the cells of a domain are told of a frame, `[n, width]`, from domain, smoke and
+            rule; about as large as 1. It is called once a frame.
+        scale: Of a named field the value that counts as 1; such an input needs nothing but what a
+            model file holds. None of what is computed.
     """
-    config, scales = rule.config, rule.scales
-    values = np.zeros((len(domain), PRIORS), dtype=np.float32)
-    if config.position_prior:
-        values[:, POSITION] = _positions(domain, smoke, rule)
-    if config.density_prior:
-        density = smoke.density_field.gather(domain.cells)
-        values[:, DENSITY] = np.minimum(density / scales.density, DENSITY_LIMIT)[:, None]
-    if smoke.velocity_field is not None:
-        values[:, VELOCITY] = normalised_velocity(smoke.velocity_field.gather(domain.cells), rule)
-    return values
+
+    name: str
+    width: int
+    values: Callable[[Domain, Volume, "Rule"], FloatArray]
+    scale: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name.isidentifier():
+            raise OptionError(f"`name` {self.name!r}: expected a name, of letters, digits and _")
+        if self.width < 1:
+            raise OptionError(f"`width` {self.width}: at least one number is needed")
+
+    @classmethod
+    def of_field(cls, name: str, *, width: int = 1, scale: float = 1.0) -> "Conditioning":
+        """A named field of the smoke, such as its temperature: see `Volume.fields`.
+
+        Args:
+            name: That of the field.
+            width: How many numbers it has at a cell.
+            scale: The value that counts as 1.
+
+        Raises:
+            OptionError: If the name, the width or the scale cannot be.
+        """
+        if not 0 < abs(scale) < np.inf:
+            raise OptionError(f"`scale` {scale}: must be finite, and not 0")
+
+        def values(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
+            del rule
+            field = smoke.named_fields.get(name)
+            if field is None:
+                raise GridError(
+                    f"frame {smoke.frame}: the rule is conditioned on {name}, and the smoke has no "
+                    "such field; name it in `fields`"
+                )
+            told = field.gather(domain.cells).reshape(len(domain), -1) / scale
+            return told.astype(np.float32)
+
+        return cls(name, width, values, scale)
 
 
-def _positions(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
+def is_known(name: str) -> bool:
+    """Whether an input of a name is registered, or one of vnca's own."""
+    return name in _KNOWN
+
+
+def conditioning_named(name: str) -> Conditioning:
+    """A registered input.
+
+    Raises:
+        OptionError: If there is none of that name.
+    """
+    if name not in _KNOWN:
+        raise OptionError(
+            f"`conditioning` {name}: expected some of {', '.join(_KNOWN)}; others have to be made "
+            "known with `register_conditioning` first"
+        )
+    return _KNOWN[name]
+
+
+def register_conditioning(conditioning: Conditioning) -> None:
+    """Make an input known, so that rules can list it, and models that do can be read.
+
+    It takes the place of one of the same name that was registered before.
+
+    Raises:
+        OptionError: If it is named like one of vnca's own.
+    """
+    if conditioning.name in _OWN:
+        raise OptionError(f"`name` {conditioning.name}: expected another than {', '.join(_OWN)}")
+    _KNOWN[conditioning.name] = conditioning
+
+
+def columns(names: Iterable[str]) -> Mapping[str, slice]:
+    """Which columns of the conditioning `[n, P]` each of some inputs takes, in their order.
+
+    Raises:
+        OptionError: If one is not known.
+    """
+    found, begin = {}, 0
+    for name in names:
+        end = begin + conditioning_named(name).width
+        found[name], begin = slice(begin, end), end
+    return found
+
+
+def priors(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
+    """What the cells of a domain are told of a frame: `[n, P]`, the rule's inputs in their order.
+
+    Inputs that the rule switches off, and velocity where the smoke has none, are zero.
+
+    Raises:
+        GridError: If the smoke lacks what the rule is conditioned on.
+        ShapeError: If a registered input gives another number of values than it says.
+    """
+    config = rule.config
+    told = np.zeros((len(domain), config.conditioning_width), dtype=np.float32)
+    for name, where in columns(config.conditioning).items():
+        if not config.is_conditioned_on(name):
+            continue
+        values = conditioning_named(name).values(domain, smoke, rule)
+        if values.shape != told[:, where].shape:
+            raise ShapeError(
+                f"conditioning {name}: expected {told[:, where].shape} values, got {values.shape}"
+            )
+        if not np.isfinite(values).all():
+            raise GridError(f"frame {smoke.frame}: conditioning {name}: not all finite")
+        told[:, where] = values
+    return told
+
+
+def _position(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
+    """(2i + 1)/H − 1, −1 to 1, in the box where the rule was trained.
+
+    What lies outside is told to lie at its border. Of a rule that does not know where that was, it
+    is the domain's box.
+    """
     box, cells = domain.box, domain.cells
     if rule.place is not None:
         there = rule.place.lattice.to_world
@@ -52,7 +165,18 @@ def _positions(domain: Domain, smoke: Volume, rule: Rule) -> FloatArray:
     return np.clip(at, -1, 1).astype(np.float32)
 
 
-def normalised_velocity(velocity: FloatArray, rule: Rule) -> FloatArray:
+def _density(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
+    density = smoke.density_field.gather(domain.cells)
+    return np.minimum(density / rule.scales.density, DENSITY_LIMIT)[:, None]
+
+
+def _velocity(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
+    if smoke.velocity_field is None:
+        return np.zeros((len(domain), 3), np.float32)
+    return normalised_velocity(smoke.velocity_field.gather(domain.cells), rule)
+
+
+def normalised_velocity(velocity: FloatArray, rule: "Rule") -> FloatArray:
     """What cells are conditioned on of a velocity `[n, 3]`, cells per frame, limited in speed.
 
     Zero if the rule switches it off.
@@ -62,3 +186,15 @@ def normalised_velocity(velocity: FloatArray, rule: Rule) -> FloatArray:
     told = np.clip(velocity / rule.scales.velocity, -_SQUARABLE, _SQUARABLE)
     speed = np.linalg.norm(told, axis=-1, keepdims=True)
     return told * (SPEED_LIMIT / np.maximum(speed, SPEED_LIMIT))
+
+
+# To give every rule a further input to choose from, list it here.
+_OWN = {
+    each.name: each
+    for each in (
+        Conditioning("position", 3, _position),
+        Conditioning("density", 1, _density),
+        Conditioning("velocity", 3, _velocity),
+    )
+}
+_KNOWN = dict(_OWN)

@@ -3,7 +3,7 @@
 import dataclasses
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -18,11 +18,18 @@ from vnca.core.files import existing_file, whole_file
 from vnca.core.lattice import Lattice, Region
 from vnca.core.typing import Box, FloatArray
 from vnca.engine.decode_weights import Weights
+from vnca.rule.conditioning import (
+    Conditioning,
+    conditioning_named,
+    is_known,
+    register_conditioning,
+)
 from vnca.rule.decoder import Decoder
-from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.rule.rule import CONDITIONING, Rule, RuleConfig, Scales
 
-FORMAT_VERSION = 2
-"""The newest that is read; a model is written in the oldest that holds it, 2 with a decoder."""
+FORMAT_VERSION = 3
+"""The newest that is read. A model is written in the oldest that holds it: 2 with a decoder, 3 if
+it is conditioned on anything else than position, density and velocity."""
 MODEL_NAME = "model.safetensors"
 """Name of the model in a run folder."""
 CONFIG_NAME = "config.json"
@@ -67,6 +74,8 @@ class Model:
             OutputError: If it cannot be written.
         """
         decoder = self.rule.decoder
+        shape = dataclasses.asdict(self.rule.config)
+        listed = list(map(_listed, shape.pop("conditioning")))
         weights = {name: getattr(self.rule, name) for name in _WEIGHTS}
         weights |= dict(zip(_DECODER, decoder.weights, strict=True)) if decoder else {}
         tensors: dict[str, NDArray[Any]] = {
@@ -78,9 +87,10 @@ class Model:
         metadata = {
             _METADATA: json.dumps(
                 {
-                    "format_version": 1 if decoder is None else 2,
+                    "format_version": _oldest_format(self.rule),
                     "version": self.version,
-                    "rule": dataclasses.asdict(self.rule.config),
+                    "rule": shape,
+                    "conditioning": listed,
                     "scales": dataclasses.asdict(self.rule.scales),
                     **_described(self.rule.place),
                     "training": self.training,
@@ -119,9 +129,13 @@ class Model:
         try:
             described = json.loads(metadata[_METADATA])
             _check_format(path, described["format_version"])
+            conditioning = _conditioning(path, described.get("conditioning"))
             rule = Rule(
                 **{name: _single_precision(name, tensors[name]) for name in _WEIGHTS},
-                config=from_record(RuleConfig, _renamed(described["rule"])),
+                config=replace(
+                    from_record(RuleConfig, _renamed(described["rule"])),
+                    conditioning=conditioning,
+                ),
                 scales=from_record(Scales, described["scales"]),
                 place=_place(described.get("place")),
                 decoder=_decoder(tensors),
@@ -153,6 +167,50 @@ def _decoder(tensors: dict[str, NDArray[Any]]) -> Decoder | None:
     if tensors.keys().isdisjoint(_DECODER):
         return None
     return Decoder(Weights(*(_single_precision(name, tensors[name]) for name in _DECODER)))
+
+
+def _oldest_format(rule: Rule) -> int:
+    """The oldest format that holds a rule."""
+    if rule.config.conditioning != CONDITIONING:
+        return 3
+    return 1 if rule.decoder is None else 2
+
+
+def _conditioning(path: Path, record: Any) -> tuple[str, ...]:
+    """What a rule is conditioned on; models that do not list it are older than the list.
+
+    Raises:
+        ValueError: If it is no list of names, widths and scales.
+        ModelError: If this program does not know one of them, or another of its name.
+    """
+    if record is None:
+        return CONDITIONING
+    if not isinstance(record, list):
+        raise ValueError(f"conditioning {record!r}")
+    for entry in record:
+        name, width, *scale = entry
+        numbers = all(type(each) in (int, float) for each in scale)
+        if not isinstance(name, str) or type(width) is not int or len(scale) > 1 or not numbers:
+            raise ValueError(f"conditioning {entry!r}")
+        if scale and not is_known(name):
+            register_conditioning(Conditioning.of_field(name, width=width, scale=scale[0]))
+        elif not is_known(name):
+            raise ModelError(
+                f"{path}: the rule is conditioned on {name}, which this program does not know; "
+                "make it known with `vnca.register_conditioning` before"
+            )
+        if _listed(name) != entry:
+            raise ModelError(
+                f"{path}: the rule is conditioned on {entry} (name, width and scale), and what is "
+                f"known by that name is {_listed(name)}"
+            )
+    return tuple(name for name, *_ in record)
+
+
+def _listed(name: str) -> list[Any]:
+    """An input as a model lists it: its name and width, and the scale of a named field."""
+    known = conditioning_named(name)
+    return [name, known.width, *([] if known.scale is None else [known.scale])]
 
 
 def _described(place: Region | None) -> dict[str, Any]:
@@ -193,12 +251,19 @@ def from_record(kind: type[T], record: Any) -> T:
     for name, value in record.items():
         if name in hints and not _fits(value, hints[name]):
             raise TypeError(f"{name}: {value!r} is of another type")
-    return kind(**record)
+    sequences = {name for name, hint in hints.items() if get_origin(hint) is tuple}
+    return kind(
+        **{name: tuple(value) if name in sequences else value for name, value in record.items()}
+    )
 
 
 def _fits(value: Any, hint: Any) -> bool:
     if get_origin(hint) is Literal:
         return value in get_args(hint)
+    if get_origin(hint) is tuple:
+        return isinstance(value, (list, tuple)) and all(
+            _fits(item, get_args(hint)[0]) for item in value
+        )
     if alternatives := get_args(hint):
         return any(_fits(value, alternative) for alternative in alternatives)
     if hint is float and type(value) is int:

@@ -8,13 +8,15 @@ import numpy as np
 from vnca.core.errors import OptionError, ShapeError
 from vnca.core.lattice import Region
 from vnca.core.typing import FloatArray
-from vnca.engine.automaton import Automaton, Weights
+from vnca.engine.automaton import FILTERS, Automaton, Weights, stencil
 from vnca.engine.domain import DomainKind
-from vnca.engine.stencil import FILTERS, stencil
+from vnca.rule.conditioning import columns, conditioning_named
 from vnca.rule.decoder import Decoder
 
+CONDITIONING = ("position", "density", "velocity")
+"""What a rule is conditioned on unless asked otherwise: the paper's priors."""
 PRIORS = 7
-"""Position (3), density (1) and velocity (3); one that is switched off is zero."""
+"""Numbers these are: position 3, density 1, velocity 3; one that is switched off is zero."""
 
 COLOUR = slice(0, 3)
 """Channels that are shown, as sRGB minus one half."""
@@ -53,8 +55,17 @@ class RuleConfig:
     """Condition cells on the density of the smoke."""
     velocity_prior: bool = True
     """Condition cells on the velocity of the smoke."""
+    conditioning: tuple[str, ...] = CONDITIONING
+    """What the hidden layer sees beside the perception, by name and in this order: position,
+    density, velocity, and what else was registered."""
 
     def __post_init__(self) -> None:
+        for name in self.conditioning:
+            conditioning_named(name)
+        if len(set(self.conditioning)) < len(self.conditioning):
+            raise OptionError(
+                f"`conditioning` {', '.join(self.conditioning)}: expected each of them once"
+            )
         if self.channels < 4:
             raise OptionError(f"`channels` {self.channels}: at least 4 are needed (colour and Δd)")
         if self.hidden < 1:
@@ -70,8 +81,21 @@ class RuleConfig:
 
     @property
     def inputs(self) -> int:
-        """Inputs of the hidden layer: perception and priors."""
-        return FILTERS * self.channels + PRIORS
+        """Inputs of the hidden layer: perception and conditioning."""
+        return FILTERS * self.channels + self.conditioning_width
+
+    @property
+    def conditioning_width(self) -> int:
+        """Numbers P that a cell is told, those that are switched off among them."""
+        return sum(conditioning_named(name).width for name in self.conditioning)
+
+    def columns(self, name: str) -> slice | None:
+        """Where in the conditioning `[n, P]` an input is; None if it is not there or always 0."""
+        return columns(self.conditioning)[name] if self.is_conditioned_on(name) else None
+
+    def is_conditioned_on(self, name: str) -> bool:
+        """Whether an input is listed, and not switched off."""
+        return name in self.conditioning and getattr(self, f"{name}_prior", True)
 
 
 @dataclass(frozen=True)
@@ -106,7 +130,7 @@ class Rule:
     """A rule that can be applied: s' = s + m · W2 relu(W1 [perception ‖ priors] + b1).
 
     Attributes:
-        hidden: W1 `[hidden, 5C + 7]`.
+        hidden: W1 `[hidden, 5C + P]`.
         bias: b1 `[hidden]`.
         output: W2 `[C, hidden]`.
         config: Its shape.

@@ -14,12 +14,11 @@ from torch import Tensor
 from vnca.core.errors import DivergenceError
 from vnca.core.typing import FloatArray
 from vnca.engine.automaton import Weights
-from vnca.engine.backend import open_session
 from vnca.engine.decode_weights import Weights as Decoded
-from vnca.engine.session import Compute
+from vnca.engine.session import Compute, open_session
 from vnca.features.network import FeatureNetwork
 from vnca.losses.appearance import AppearanceLoss
-from vnca.losses.overflow import overflow
+from vnca.losses.terms import overflow
 from vnca.rule.decoder import Decoder
 from vnca.rule.rule import DENSITY_CHANGE, Rule
 from vnca.training.config import TrainingConfig

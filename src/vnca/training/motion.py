@@ -15,7 +15,7 @@ from torch import Tensor
 
 from vnca.features.flow import FlowNetwork
 from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss, supervised
-from vnca.losses.pixels import luma
+from vnca.losses.terms import luma
 from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
 from vnca.training.snapshot import Snapshot
 

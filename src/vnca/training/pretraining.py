@@ -6,8 +6,12 @@ on drawing them on smoke.
 """
 
 import dataclasses
+from collections.abc import Sequence
 
-from vnca.rule.rule import PRIORS, Rule
+import numpy as np
+
+from vnca.engine.automaton import FILTERS
+from vnca.rule.rule import Rule
 from vnca.training.presets import DEFAULT, preset
 from vnca.training.smoke_config import SmokeConfig
 from vnca.training.texture_config import TextureConfig
@@ -51,8 +55,17 @@ def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | N
     )
 
 
-def without_prior_weights(rule: Rule) -> Rule:
-    """The rule with no weight on any prior: a texture has had none to learn what they mean."""
-    hidden = rule.hidden.copy()
-    hidden[:, -PRIORS:] = 0
-    return dataclasses.replace(rule, hidden=hidden)
+def without_prior_weights(rule: Rule, conditioning: Sequence[str] | None = None) -> Rule:
+    """The rule with no weight on any prior: a texture has had none to learn what they mean.
+
+    Args:
+        rule: A texture.
+        conditioning: What the rule is to be conditioned on; as it is unless given.
+    """
+    config = rule.config
+    if conditioning is not None:
+        config = dataclasses.replace(config, conditioning=tuple(conditioning))
+    perceived = FILTERS * config.channels
+    hidden = np.zeros((config.hidden, config.inputs), np.float32)
+    hidden[:, :perceived] = rule.hidden[:, :perceived]
+    return dataclasses.replace(rule, hidden=hidden, config=config)

@@ -4,8 +4,8 @@ import numpy as np
 import torch
 
 from vnca.core.typing import FloatArray
+from vnca.io.film import contact_sheet
 from vnca.io.picture import resize
-from vnca.io.sheet import contact_sheet
 from vnca.training.loop import Trainer
 
 SIZE = 256

@@ -24,7 +24,7 @@ class Scene(ABC, Generic[Viewpoint]):
 
     Attributes:
         domain: The cells that live.
-        priors: `[n, 7]`.
+        priors: `[n, P]`, what the rule is conditioned on.
         decoder: What is seen between cells, tensors that can be trained; None where states are
             interpolated.
         samples: About how many are taken along the ray of a pixel.
@@ -46,11 +46,11 @@ class Scene(ABC, Generic[Viewpoint]):
         decoder: Decoder | None = None,
         backend: str = "auto",
     ) -> None:
-        """Put the cells, their priors `[n, 7]` and the decoder on the device.
+        """Put the cells, their priors `[n, P]` and the decoder on the device.
 
         Args:
             domain: The active cells.
-            priors: `[n, 7]`.
+            priors: `[n, P]`.
             device: Where rollouts and pictures are computed.
             width: Cells across a picture.
             decoder: What is seen between cells; states are interpolated unless given.

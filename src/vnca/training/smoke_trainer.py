@@ -9,7 +9,7 @@ from vnca.core.typing import AnyArray, FloatArray
 from vnca.core.volume import Volume
 from vnca.features.flow import FlowNetwork
 from vnca.features.network import FeatureNetwork
-from vnca.io.orientation import on_lattice
+from vnca.io.smoke_format import on_lattice
 from vnca.rendering.brightness import gamma_for_cell_opacity, gamma_for_own_colour
 from vnca.rule.rule import Rule, Scales, density_scale
 from vnca.training.loop import Trainer

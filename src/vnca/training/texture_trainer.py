@@ -10,7 +10,7 @@ import torch
 
 from vnca.core.typing import FloatArray
 from vnca.features.network import FeatureNetwork
-from vnca.io.mesh.mesh import Mesh
+from vnca.io.mesh import Mesh
 from vnca.rule.rule import Rule, Scales
 from vnca.training.loop import Trainer
 from vnca.training.scenes.texture import BlockScene
@@ -43,6 +43,7 @@ def texture_trainer(
     scene = BlockScene(
         config.block,
         config.slice,
+        conditioning_width=config.rule.conditioning_width,
         mesh=mesh,
         decoder=rule.decoder,
         device=device,

@@ -12,13 +12,12 @@ from torch import Tensor
 from vnca.core.errors import ShapeError
 from vnca.core.typing import AnyArray, FloatArray, IntArray
 from vnca.engine.decode_weights import Weights
-from vnca.engine.domain import Domain
+from vnca.engine.domain import Domain, subdivided
 from vnca.engine.native import decode as native
 from vnca.engine.native import step as native_step
 from vnca.engine.native.decode_autograd import decode as native_decode
 from vnca.engine.numpy import decode as array_reference
 from vnca.engine.reference import decode as reference
-from vnca.engine.subdivision import subdivided
 from vnca.engine.triton import decode as triton_backend
 from vnca.engine.triton.step import unavailable
 

@@ -10,8 +10,8 @@ import pytest
 
 from vnca.core.errors import ShapeError
 from vnca.core.typing import AnyArray
+from vnca.engine.automaton import stencil
 from vnca.engine.native import step as native
-from vnca.engine.stencil import stencil
 
 CELLS, CHANNELS, HIDDEN, PRIORS = 50, 5, 7, 3
 

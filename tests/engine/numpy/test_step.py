@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.engine.automaton import Weights
+from vnca.engine import numpy as array_reference
+from vnca.engine.automaton import Weights, changing_rows, stencil
 from vnca.engine.domain import Domain
-from vnca.engine.mask import changing_rows
-from vnca.engine.numpy import step as array_reference
 from vnca.engine.reference import step as reference
-from vnca.engine.stencil import stencil
 
 
 @pytest.mark.parametrize("shape", [(1, 1, 1), (7, 9, 11)])

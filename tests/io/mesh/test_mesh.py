@@ -10,8 +10,8 @@ import trimesh
 from PIL import Image
 
 from vnca.core.errors import FileFormatError, GridError, OptionError, VncaError
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh.glb import Glb
-from vnca.io.mesh.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import base_colours
 
 DATA = Path(__file__).parents[2] / "data"
@@ -314,7 +314,7 @@ def test_parts_that_share_vertices_cannot_multiply_them_without_end(
     mesh["primitives"] *= 10
     glb.write(tmp_path / "b.glb")
     assert len(read_mesh(tmp_path / "b.glb").surfaces) == 10
-    monkeypatch.setattr("vnca.io.mesh.mesh.MOST_VERTICES", 5 * len(BOX.vertices))
+    monkeypatch.setattr("vnca.io.mesh.MOST_VERTICES", 5 * len(BOX.vertices))
     with pytest.raises(FileFormatError, match="more than 40 vertices together"):
         read_mesh(tmp_path / "b.glb")
 

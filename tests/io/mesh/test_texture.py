@@ -13,8 +13,8 @@ from PIL import Image
 
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import FileFormatError
+from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh.glb import Glb
-from vnca.io.mesh.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import Unwrapping, base_colours, put_on, write_coloured
 
 

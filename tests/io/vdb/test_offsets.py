@@ -12,7 +12,7 @@ import pytest
 
 from vnca.core.errors import FileFormatError, GridError
 from vnca.io.vdb import VALUE_TYPES, Grid, open_vdb, write_vdb
-from vnca.io.vdb.cursor import Cursor
+from vnca.io.vdb.layout import Cursor
 from vnca.io.vdb.metadata import read_metadata
 
 Builder = Callable[..., Grid]

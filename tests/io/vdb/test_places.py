@@ -11,8 +11,8 @@ import pytest
 from vnca.core.lattice import Lattice
 from vnca.core.typing import AnyArray
 from vnca.core.volume import Volume
-from vnca.io.orientation import on_lattice
 from vnca.io.smoke import SmokeFormat, read_smoke, write_painted
+from vnca.io.smoke_format import on_lattice
 
 Judge = Callable[[list[Path]], list[list[dict[str, Any]]]]
 FORM = SmokeFormat(velocity_units="m/s", fps=4)

@@ -5,9 +5,8 @@ from typing import Any
 
 from vnca.core.typing import FloatArray
 from vnca.engine.automaton import Weights
-from vnca.engine.backend import Backend
 from vnca.engine.native import step as native
-from vnca.engine.session import PRECISIONS, Compute, Job, Session, StepSession
+from vnca.engine.session import PRECISIONS, Backend, Compute, Job, Session, StepSession
 
 
 class NativeBackend(Backend):

@@ -14,7 +14,7 @@ import numpy as np
 
 from vnca.core.errors import BackendUnavailableError, OptionError, ShapeError
 from vnca.core.typing import FloatArray, IntArray
-from vnca.engine.mask import mask_key, mask_threshold
+from vnca.engine.automaton import mask_key, mask_threshold
 from vnca.engine.session import PRECISIONS
 
 try:
@@ -66,7 +66,7 @@ def default_threads() -> int:
 
 
 def changing_rows(hashes: IntArray, *, seed: int, step: int, probability: float) -> IntArray:
-    """Rows `[m]` of the cells that change, as `vnca.engine.mask.changing_rows` draws them.
+    """Rows `[m]` of the cells that change, as `vnca.engine.automaton.changing_rows` draws them.
 
     Args:
         hashes: `[n]`, the bits of `hash_cells` as int32.
@@ -114,7 +114,7 @@ def forward(
         hidden: W1 `[H, 5C + P]`, H at most 512.
         bias: b1 `[H]`.
         output: W2 `[C, H]`.
-        stencil: `[5, 27]` from `vnca.engine.stencil`, with any divisors.
+        stencil: `[5, 27]` from `vnca.engine.automaton`, with any divisors.
         threads: How many to use; by default one for each core.
         out: `[n + 1, C]` to write to; by default a new array.
         precision: What the factors of W1 [z ‖ priors] and W2 relu(…) are rounded to.

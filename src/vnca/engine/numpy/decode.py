@@ -9,7 +9,7 @@ import numpy as np
 
 from vnca.core.typing import FloatArray, IntArray
 from vnca.engine.decode_weights import OUTPUTS, Weights
-from vnca.engine.subdivision import subdivided
+from vnca.engine.domain import subdivided
 
 SLAB = 4096
 """Points worked through at a time: their hidden layers stay in cache."""

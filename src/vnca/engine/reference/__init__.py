@@ -3,8 +3,7 @@
 import importlib.util
 from typing import Any
 
-from vnca.engine.backend import Backend
-from vnca.engine.session import Compute, Job, Session
+from vnca.engine.session import Backend, Compute, Job, Session
 
 
 class ReferenceBackend(Backend):
@@ -20,8 +19,7 @@ class ReferenceBackend(Backend):
 
     def session(self, job: Job) -> Session:
         """See `Backend.session`."""
-        from vnca.engine.reference.mask import changing_rows
-        from vnca.engine.tensors import tensor_session
+        from vnca.engine.tensors import changing_rows, tensor_session
 
         return tensor_session(job, draw=changing_rows, update=self.update())
 

@@ -3,8 +3,7 @@
 import importlib.util
 from typing import Any
 
-from vnca.engine.backend import Backend
-from vnca.engine.session import Compute, Job, Session
+from vnca.engine.session import Backend, Compute, Job, Session
 
 
 class TritonBackend(Backend):
@@ -23,7 +22,7 @@ class TritonBackend(Backend):
     def session(self, job: Job) -> Session:
         """See `Backend.session`."""
         from vnca.engine.tensors import tensor_session
-        from vnca.engine.triton.mask import changing_rows
+        from vnca.engine.triton.step_kernels import changing_rows
 
         return tensor_session(job, draw=changing_rows, update=self.update())
 

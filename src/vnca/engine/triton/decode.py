@@ -9,7 +9,14 @@ from torch.autograd.function import once_differentiable
 
 from vnca.core.errors import ShapeError
 from vnca.engine.decode_weights import CORNERS, OUTPUTS, Weights
-from vnca.engine.triton.step import LARGEST, OPTIONS, TYPES, Precision
+from vnca.engine.triton.step import (
+    LARGEST,
+    OPTIONS,
+    Precision,
+    default_precision,
+    programs,
+    require_layout,
+)
 
 try:
     import triton
@@ -19,8 +26,6 @@ except ImportError:  # as `vnca.engine.triton.step.unavailable` says
     triton: Any = None
     triton_kernels: Any = None
 
-PROGRAMS = 4
-"""Programs for each multiprocessor; they take tiles of points in turns."""
 TILES = 64, 16, 64
 """Points that a program works on at a time in the forward pass and in the network's gradient, and
 cells in the state's."""
@@ -58,10 +63,7 @@ def decode(
         ShapeError: If shapes or types are not as above, or too large.
     """
     _check(state, rows, fractions, weights)
-    if precision is None:
-        exact = torch.get_float32_matmul_precision() == "highest"
-        precision = "tf32x3" if exact else "tf32"
-    result = _Decode.apply(state, rows, fractions, *weights, precision)
+    result = _Decode.apply(state, rows, fractions, *weights, precision or default_precision())
     assert isinstance(result, Tensor)
     return result
 
@@ -78,7 +80,7 @@ class _Decode(torch.autograd.Function):
         if points:
             sizes = _sizes(tensors, TILES[0])
             with torch.cuda.device_of(state):
-                triton_kernels.forward_kernel[(_programs(fractions, TILES[0]),)](
+                triton_kernels.forward_kernel[(programs(points, TILES[0], state.device),)](
                     *tensors, out, points, **sizes, PRECISION=ctx.precision, **OPTIONS
                 )
         return out
@@ -93,9 +95,9 @@ class _Decode(torch.autograd.Function):
         state, rows, fractions, *weights = tensors
         points, cells = len(fractions), len(state) - 1
         sizes = _sizes(tensors, TILES[1])
-        programs = _programs(fractions, TILES[1])
+        count = programs(points, TILES[1], state.device)
         lengths = [weight.numel() for weight in weights]
-        partials = state.new_empty((programs, sum(lengths)), dtype=torch.float32)
+        partials = state.new_empty((count, sum(lengths)), dtype=torch.float32)
         to_between = state.new_empty((points, state.shape[1]), dtype=torch.float32)
         to_state = torch.zeros_like(state)
         if points:
@@ -103,7 +105,7 @@ class _Decode(torch.autograd.Function):
             every = torch.arange(cells + 1, dtype=torch.int32, device=rows.device)
             begin = torch.searchsorted(found, every, out_int32=True)
             with torch.cuda.device_of(state):
-                triton_kernels.network_kernel[(programs,)](
+                triton_kernels.network_kernel[(count,)](
                     *tensors,
                     gradient,
                     to_between,
@@ -146,13 +148,6 @@ def _sizes(tensors: Sequence[Tensor], tile: int) -> dict[str, int]:
     }
 
 
-def _programs(fractions: Tensor, tile: int) -> int:
-    processors = 1
-    if fractions.device.type == "cuda":
-        processors = torch.cuda.get_device_properties(fractions.device).multi_processor_count
-    return min(triton.cdiv(len(fractions), tile), PROGRAMS * processors)
-
-
 def _check(state: Tensor, rows: Tensor, fractions: Tensor, weights: Weights) -> None:
     """Everything but the values of rows, which the CPU does not know."""
     n, c = state.shape if state.ndim == 2 else (0, 0)
@@ -164,17 +159,7 @@ def _check(state: Tensor, rows: Tensor, fractions: Tensor, weights: Weights) -> 
     }
     named = zip(Weights._fields, weights, Weights.shapes(c, units), strict=True)
     shapes |= {name.replace("_", " "): (weight, shape) for name, weight, shape in named}
-    for name, (tensor, shape) in shapes.items():
-        indices = name == "rows"
-        if tuple(tensor.shape) != shape:
-            problem = f"expected shape {shape}, got {tuple(tensor.shape)}"
-        elif tensor.dtype not in ((torch.int32,) if indices else TYPES):
-            problem = f"expected {'int32' if indices else 'float32 or shorter'}, got {tensor.dtype}"
-        elif tensor.device != state.device:
-            problem = f"expected on {state.device} like the state, got {tensor.device}"
-        else:
-            continue
-        raise ShapeError(f"decoding: {name}: {problem}")
+    require_layout("decoding", shapes, ("rows",))
     if not (OUTPUTS <= c <= MOST_CHANNELS and 1 <= units <= MOST_UNITS and n >= 1):
         raise ShapeError(
             f"decoding: {n} rows of {c} channels, {units} units: the Triton kernels work with at "

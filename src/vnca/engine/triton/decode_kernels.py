@@ -54,6 +54,36 @@ def _bias(bias, OUTPUTS, TO: tl.constexpr):
     return tl.load(bias + o, mask=o < OUTPUTS, other=0).to(tl.float32)[None, :]
 
 
+@triton.jit
+def _matrices(
+    first,
+    second,
+    third,
+    output,
+    C: tl.constexpr,
+    H: tl.constexpr,
+    WIDTH: tl.constexpr,
+    UNITS: tl.constexpr,
+):
+    """The weights of all layers, transposed."""
+    return (
+        _transposed(first, C, H, WIDTH, UNITS),
+        _transposed(second, H, H, UNITS, UNITS),
+        _transposed(third, H, H, UNITS, UNITS),
+        _transposed(output, H, 4, UNITS, WIDTH),
+    )
+
+
+@triton.jit
+def _hidden_biases(first_bias, second_bias, third_bias, H: tl.constexpr, UNITS: tl.constexpr):
+    """Those of the sine layers."""
+    return (
+        _bias(first_bias, H, UNITS),
+        _bias(second_bias, H, UNITS),
+        _bias(third_bias, H, UNITS),
+    )
+
+
 # Sizes that differ from call to call must not compile the kernels anew.
 @triton.jit(do_not_specialize=["points"])
 def forward_kernel(
@@ -78,13 +108,8 @@ def forward_kernel(
     PRECISION: tl.constexpr,
 ):
     """What is seen `[m, 4]` at points. Programs take tiles of them in turns."""
-    w1 = _transposed(first, C, H, WIDTH, UNITS)
-    w2 = _transposed(second, H, H, UNITS, UNITS)
-    w3 = _transposed(third, H, H, UNITS, UNITS)
-    w4 = _transposed(output, H, 4, UNITS, WIDTH)
-    b1 = _bias(first_bias, H, UNITS)
-    b2 = _bias(second_bias, H, UNITS)
-    b3 = _bias(third_bias, H, UNITS)
+    w1, w2, w3, w4 = _matrices(first, second, third, output, C, H, WIDTH, UNITS)
+    b1, b2, b3 = _hidden_biases(first_bias, second_bias, third_bias, H, UNITS)
     b4 = _bias(output_bias, 4, WIDTH)
     seen = tl.arange(0, WIDTH)[None, :]
     for tile in range(tl.program_id(0), tl.cdiv(points, TILE), tl.num_programs(0)):
@@ -142,13 +167,8 @@ def network_kernel(
     Writes the latter to `to_between` `[m, C]`, and a program's sums to `partials` `[programs, …]`:
     weights, transposed, and bias of each layer in turn.
     """
-    w1 = _transposed(first, C, H, WIDTH, UNITS)
-    w2 = _transposed(second, H, H, UNITS, UNITS)
-    w3 = _transposed(third, H, H, UNITS, UNITS)
-    w4 = _transposed(output, H, 4, UNITS, WIDTH)
-    b1 = _bias(first_bias, H, UNITS)
-    b2 = _bias(second_bias, H, UNITS)
-    b3 = _bias(third_bias, H, UNITS)
+    w1, w2, w3, w4 = _matrices(first, second, third, output, C, H, WIDTH, UNITS)
+    b1, b2, b3 = _hidden_biases(first_bias, second_bias, third_bias, H, UNITS)
     to_w1 = tl.zeros([WIDTH, UNITS], tl.float32)
     to_w2 = tl.zeros([UNITS, UNITS], tl.float32)
     to_w3 = tl.zeros([UNITS, UNITS], tl.float32)

@@ -1,7 +1,7 @@
 """The step on NVIDIA GPUs in torch's automatic differentiation, computed by Triton kernels."""
 
-from collections.abc import Callable
-from typing import Any, Literal, TypeVar
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 import torch
@@ -10,21 +10,18 @@ from torch.autograd.function import once_differentiable
 from torch.utils.weak import WeakTensorKeyDictionary
 
 from vnca.core.errors import ShapeError
+from vnca.engine.automaton import FILTERS, NEIGHBOURS
+from vnca.engine.automaton import stencil as filters
 from vnca.engine.reference.step import Weights
-from vnca.engine.stencil import FILTERS, NEIGHBOURS
-from vnca.engine.stencil import stencil as filters
-from vnca.engine.triton.perceivers import Perceivers
 
 try:
     import triton
     from triton import knobs
 
-    from vnca.engine.triton import step_backward as triton_backward
-    from vnca.engine.triton import step_forward as triton_forward
+    from vnca.engine.triton import step_kernels
 except ImportError as error:
     triton: Any = None
-    triton_forward: Any = None
-    triton_backward: Any = None
+    step_kernels: Any = None
     _missing = str(error)
     _interpreted = False
 else:
@@ -34,9 +31,8 @@ else:
 T = TypeVar("T")
 Precision = Literal["ieee", "tf32x3", "tf32"]
 """Products of float32: exact, as three products on tensor cores (nearly so), as one (10 bits)."""
-
 PROGRAMS = 4
-"""Programs for each multiprocessor; they take tiles of changing cells in turns."""
+"""Programs for each multiprocessor; they take tiles of changing cells, or of points, in turns."""
 TILE = 64
 """Cells that a program works on at a time, if their channels are 16 or fewer."""
 WARPS = 4, 8, 4
@@ -50,6 +46,57 @@ MOST_CHANNELS, MOST_PRIORS = 64, 31
 """What fits into a multiprocessor."""
 LARGEST = 2**31 - 1
 """Offsets into arrays are 32-bit numbers."""
+_perceivers: WeakTensorKeyDictionary = WeakTensorKeyDictionary()
+_scales: WeakTensorKeyDictionary = WeakTensorKeyDictionary()
+
+
+class Perceivers(NamedTuple):
+    """For each cell r, all cells i and offsets o with `neighbours[o, i] == r`.
+
+    Nearly always i is itself a neighbour of r, at the opposite offset. Where the border of a box
+    repeats cells it need not be; those pairs are listed, by r.
+
+    Attributes:
+        mutual: `[n]` int32; bit o is set if `neighbours[26 - o, r]` is such an i.
+        begin: `[n + 1]` int32; the other pairs of r are those from `begin[r]` to `begin[r + 1]`.
+        source: Their cells i, int32.
+        weights: `[5, pairs]` of the filters at their offsets o, whole numbers, before any scale.
+    """
+
+    mutual: Tensor
+    begin: Tensor
+    source: Tensor
+    weights: Tensor
+
+    @classmethod
+    def of(cls, neighbours: Tensor) -> "Perceivers":
+        """Read a table `[27, n]` backwards, on its own device."""
+        n = neighbours.shape[1]
+        cells = torch.arange(n, dtype=torch.int32, device=neighbours.device)
+        mutual = torch.zeros_like(cells)
+        pairs = []
+        for offset, opposite in zip(range(NEIGHBOURS), reversed(neighbours), strict=True):
+            mutual |= _looks_back(opposite, neighbours[offset], cells).int() << offset
+            target = neighbours[offset]
+            one_way = (target < n) & ~_looks_back(target, opposite, cells)
+            source = cells[one_way]
+            pairs.append(torch.stack([target[one_way], source, torch.full_like(source, offset)]))
+        target, source, offset = torch.cat(pairs, dim=1)
+        target, order = torch.sort(target, stable=True)
+        begin = torch.searchsorted(
+            target, torch.arange(n + 1, device=target.device), out_int32=True
+        )
+        forms = torch.from_numpy(filters(sobel_divisor=1, laplacian_divisor=1))
+        weights = forms.to(offset.device)[:, offset[order].long()].contiguous()
+        return cls(mutual, begin, source[order], weights)
+
+
+def _looks_back(there: Tensor, back: Tensor, cells: Tensor) -> Tensor:
+    """Which `cells` are found again by looking from the rows `there` along the table `back`."""
+    n = len(cells)
+    if n == 0:
+        return torch.zeros_like(cells, dtype=torch.bool)
+    return (there < n) & (back[there.clamp(max=n - 1).long()] == cells)
 
 
 def unavailable(device: str) -> str | None:
@@ -89,7 +136,7 @@ def update(
             checked. What is derived from the table is kept with it: do not change it in place.
         priors: `[n, P]`.
         weights: W1, b1 and W2.
-        stencil: `[5, 27]` from `vnca.engine.stencil`, with any divisors.
+        stencil: `[5, 27]` from `vnca.engine.automaton`, with any divisors.
         precision: Of float32 products; by default `tf32x3`, or `tf32` if torch is told that this
             is enough (`torch.set_float32_matmul_precision`).
 
@@ -97,9 +144,7 @@ def update(
         ShapeError: If shapes or types are not as above, or too large.
     """
     _check(state, rows, neighbours, priors, weights)
-    if precision is None:
-        exact = torch.get_float32_matmul_precision() == "highest"
-        precision = "tf32x3" if exact else "tf32"
+    precision = precision or default_precision()
     trained = torch.is_grad_enabled() and any(t.requires_grad for t in (state, *weights))
     perceivers = _known(_perceivers, Perceivers.of, neighbours) if trained else None
     scales = _known(_scales, _read_scales, stencil)
@@ -121,7 +166,8 @@ class _Update(torch.autograd.Function):
         out = torch.empty_like(state)
         sizes = _sizes(state, tensors[3], tensors[4], WEIGHT_BYTES[0])
         with torch.cuda.device_of(state):
-            triton_forward.forward_kernel[(_programs(rows, sizes),)](
+            count = programs(len(rows), sizes["TILE"], rows.device)
+            step_kernels.forward_kernel[(count,)](
                 *tensors,
                 out,
                 neighbours.shape[1],
@@ -145,17 +191,17 @@ class _Update(torch.autograd.Function):
         hidden = weights[0]
         n, channels, units = neighbours.shape[1], state.shape[1], len(hidden)
         sizes = _sizes(state, priors, hidden, WEIGHT_BYTES[1])
-        programs = _programs(rows, sizes)
+        count = programs(len(rows), sizes["TILE"], rows.device)
         # Unsummed gradients of W1ᵀ, b1 and W2, one below the other.
         partials = state.new_empty(
-            (programs, hidden.shape[1] + 1 + channels, units), dtype=torch.float32
+            (count, hidden.shape[1] + 1 + channels, units), dtype=torch.float32
         )
         to_perceived = state.new_empty(len(rows), FILTERS * channels)
         place = torch.full((n,), -1, dtype=torch.int32, device=state.device)
         to_state = torch.empty_like(state)
         with torch.cuda.device_of(state):
-            if programs:
-                triton_backward.weights_kernel[(programs,)](
+            if count:
+                step_kernels.weights_kernel[(count,)](
                     *tensors,
                     gradient,
                     to_perceived,
@@ -170,7 +216,7 @@ class _Update(torch.autograd.Function):
                     **OPTIONS,
                 )
             tile = sizes["TILE"]
-            triton_backward.state_kernel[(triton.cdiv(n + 1, tile),)](
+            step_kernels.state_kernel[(triton.cdiv(n + 1, tile),)](
                 gradient,
                 to_perceived,
                 place,
@@ -209,11 +255,44 @@ def _sizes(state: Tensor, priors: Tensor, hidden: Tensor, weight_bytes: int) -> 
     }
 
 
-def _programs(rows: Tensor, sizes: dict[str, int]) -> int:
+def default_precision() -> Precision:
+    """Of float32 products, unless one is asked for: what torch is told to be enough."""
+    return "tf32x3" if torch.get_float32_matmul_precision() == "highest" else "tf32"
+
+
+def programs(count: int, tile: int, device: torch.device) -> int:
+    """How many programs take tiles of so many cells or points in turns."""
     processors = 1
-    if rows.device.type == "cuda":
-        processors = torch.cuda.get_device_properties(rows.device).multi_processor_count
-    return min(triton.cdiv(len(rows), sizes["TILE"]), PROGRAMS * processors)
+    if device.type == "cuda":
+        processors = torch.cuda.get_device_properties(device).multi_processor_count
+    return min(triton.cdiv(count, tile), PROGRAMS * processors)
+
+
+def require_layout(
+    operation: str, arrays: Mapping[str, tuple[Tensor, tuple[int, ...]]], indices: Collection[str]
+) -> None:
+    """Refuse arrays that kernels cannot read.
+
+    Args:
+        operation: What a message calls it.
+        arrays: Each with the shape expected, by name; all are to be where the first is.
+        indices: Names of those that hold int32.
+
+    Raises:
+        ShapeError: Naming the first of another shape, type or place.
+    """
+    where = next(iter(arrays.values()))[0].device
+    for name, (tensor, shape) in arrays.items():
+        whole = name in indices
+        if tuple(tensor.shape) != shape:
+            problem = f"expected shape {shape}, got {tuple(tensor.shape)}"
+        elif tensor.dtype not in ((torch.int32,) if whole else TYPES):
+            problem = f"expected {'int32' if whole else 'float32 or shorter'}, got {tensor.dtype}"
+        elif tensor.device != where:
+            problem = f"expected on {where} like the state, got {tensor.device}"
+        else:
+            continue
+        raise ShapeError(f"{operation}: {name}: {problem}")
 
 
 def _check(
@@ -232,17 +311,7 @@ def _check(
         "hidden bias": (weights.bias, (h,)),
         "output weights": (weights.output, (c, h)),
     }
-    for name, (tensor, shape) in shapes.items():
-        indices = name in ("rows", "neighbours")
-        if tuple(tensor.shape) != shape:
-            problem = f"expected shape {shape}, got {tuple(tensor.shape)}"
-        elif tensor.dtype not in ((torch.int32,) if indices else TYPES):
-            problem = f"expected {'int32' if indices else 'float32 or shorter'}, got {tensor.dtype}"
-        elif tensor.device != state.device:
-            problem = f"expected on {state.device} like the state, got {tensor.device}"
-        else:
-            continue
-        raise ShapeError(f"update step: {name}: {problem}")
+    require_layout("update step", shapes, ("rows", "neighbours"))
     if not (1 <= c <= MOST_CHANNELS and p <= MOST_PRIORS and h >= 1):
         raise ShapeError(
             f"update step: {c} channels, {p} priors, {h} hidden units: the Triton kernels work "
@@ -253,10 +322,6 @@ def _check(
             f"update step: {n} cells of {c} channels: too many for the 32-bit offsets of the "
             "Triton kernels"
         )
-
-
-_perceivers: WeakTensorKeyDictionary = WeakTensorKeyDictionary()
-_scales: WeakTensorKeyDictionary = WeakTensorKeyDictionary()
 
 
 def _known(results: WeakTensorKeyDictionary, compute: Callable[[Tensor], T], of: Tensor) -> T:

@@ -16,8 +16,7 @@ import numpy as np
 
 from vnca.core.errors import GridError
 from vnca.core.typing import AnyArray, BoolArray
-from vnca.io.vdb.cursor import Cursor
-from vnca.io.vdb.layout import Compression, NodeCode, ValueType, bits_of
+from vnca.io.vdb.layout import Compression, Cursor, NodeCode, ValueType, bits_of
 
 _BLOSC_HEADER = struct.Struct("<4B3I")  # versions, flags, type size; bytes, block, packed bytes
 _BLOSC_LEVEL, _ONE_BLOCK = 9, 32 * 1024

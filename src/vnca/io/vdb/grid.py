@@ -6,13 +6,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from vnca.core.bricks.field import Field, as_bricks
-from vnca.core.bricks.places import covered
+from vnca.core.bricks import covered
 from vnca.core.errors import GridError
+from vnca.core.field import Field, as_bricks
 from vnca.core.typing import AnyArray, BoolArray, Box, Index, IntArray
 from vnca.io.vdb.layout import LEAF_CELLS, LEAF_EDGE, VALUE_TYPES, ValueType
-from vnca.io.vdb.metadata import NAMES_OF_TYPES, Metadata
-from vnca.io.vdb.transform import Transform
+from vnca.io.vdb.metadata import NAMES_OF_TYPES, Metadata, Transform
 from vnca.io.vdb.tree import Tiles, Tree
 
 EMPTY_BOX = Box((0, 0, 0), (0, 0, 0))

@@ -10,7 +10,6 @@ from typing import BinaryIO
 
 from vnca.core.errors import GridError
 from vnca.core.typing import Box
-from vnca.io.vdb.cursor import Cursor
 from vnca.io.vdb.grid import EMPTY_BOX, Grid
 from vnca.io.vdb.layout import (
     HALF_SUFFIX,
@@ -19,9 +18,9 @@ from vnca.io.vdb.layout import (
     VALUE_TYPES,
     WRITTEN_VERSION,
     Compression,
+    Cursor,
 )
-from vnca.io.vdb.metadata import Metadata, read_metadata
-from vnca.io.vdb.transform import Transform, read_transform
+from vnca.io.vdb.metadata import Metadata, Transform, read_metadata, read_transform
 from vnca.io.vdb.tree import locate_leaves, read_tree
 
 _TREE_NAME = "Tree_{}_" + "_".join(map(str, TREE))

@@ -10,7 +10,6 @@ import numpy as np
 
 from vnca.core.typing import AnyArray, BoolArray, IntArray
 from vnca.io.vdb.compression import Codec, read_value
-from vnca.io.vdb.cursor import Cursor
 from vnca.io.vdb.layout import (
     LEAF_CELLS,
     LEAF_EDGE,
@@ -19,6 +18,7 @@ from vnca.io.vdb.layout import (
     UPPER_EDGE,
     UPPER_SLOTS,
     Compression,
+    Cursor,
     ValueType,
     bits_of,
     slot_origins,

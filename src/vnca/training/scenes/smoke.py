@@ -16,13 +16,13 @@ from vnca.core.errors import GridError
 from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
-from vnca.losses.pixels import luma
+from vnca.losses.terms import luma
 from vnca.rendering.brightness import gamma_for_own_colour
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
 from vnca.rendering.velocity import projected_velocity
 from vnca.rendering.view import Shader, View, render
-from vnca.rule.conditioning import DENSITY, VELOCITY, normalised_velocity, priors
 from vnca.rule.conditioning import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
+from vnca.rule.conditioning import normalised_velocity, priors
 from vnca.rule.rule import SMOKE_THRESHOLD, Rule
 from vnca.training.scene import Scene, colours, density_factors
 from vnca.training.smoke_config import ViewConfig
@@ -155,10 +155,12 @@ class SmokeScene(Scene[SmokeViewpoint]):
         scene = copy.copy(self)
         scene.velocity = torch.from_numpy(velocity).to(self.velocity)
         scene.priors = self.priors.clone()
-        scene.priors[:, VELOCITY] = told.to(self.priors)
-        if self._rule.config.density_prior:
+        config = self._rule.config
+        if (where := config.columns("velocity")) is not None:
+            scene.priors[:, where] = told.to(self.priors)
+        if (where := config.columns("density")) is not None:
             density = (self._density * denser).clamp_max(TOLD_DENSITY_LIMIT)
-            scene.priors[:, DENSITY] = density[:, None]
+            scene.priors[:, where] = density[:, None]
         return scene
 
     def camera(

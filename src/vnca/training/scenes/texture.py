@@ -9,7 +9,7 @@ from torch import Tensor
 
 from vnca.core.camera import Orthographic
 from vnca.core.typing import BoolArray, FloatArray
-from vnca.io.mesh.mesh import Mesh
+from vnca.io.mesh import Mesh
 from vnca.meshes.raster import visible
 from vnca.painting.block import block_domain
 from vnca.rule.decoder import Decoder
@@ -76,6 +76,7 @@ class BlockScene(Scene[list[Cut]]):
         size: int,
         slices: SliceConfig,
         *,
+        conditioning_width: int = PRIORS,
         mesh: Mesh | None = None,
         decoder: Decoder | None = None,
         device: torch.device | str = "cpu",
@@ -86,6 +87,7 @@ class BlockScene(Scene[list[Cut]]):
         Args:
             size: Cells along an edge.
             slices: How it is looked at.
+            conditioning_width: Numbers that a cell of the rule is told: all are zero here.
             mesh: Seen from all sides beside the slices.
             decoder: What is seen between cells; they are interpolated unless given.
             device: Where rollouts and pictures are computed.
@@ -95,7 +97,7 @@ class BlockScene(Scene[list[Cut]]):
             OptionError: If the size cannot work.
         """
         domain = block_domain(size)
-        nothing = np.zeros((len(domain), PRIORS), np.float32)
+        nothing = np.zeros((len(domain), conditioning_width), np.float32)
         super().__init__(
             domain, nothing, device, width=slices.cells, decoder=decoder, backend=backend
         )

@@ -1,1 +1,0 @@
-"""Cells of a grid as bricks of 8³, kept only where there is something."""
