@@ -82,6 +82,10 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+def paint_of(folder: Path) -> dict[str, bytes]:
+    return {path.name: colours(path) for path in folder.iterdir()}
+
+
 def test_stopping_keeps_what_is_painted_and_goes_on_when_the_frame_is_mended(
     paint: Paint, smoke: Path, tmp_path: Path
 ) -> None:
@@ -117,7 +121,8 @@ def test_a_skipped_frame_leaves_a_gap_and_one_line(
     assert outcome.code == 0
     (told,) = [line for line in outcome.err.splitlines() if "ball_0002.vdb" in line]
     assert told.endswith("; leaving it out")
-    assert contents(tmp_path / "out") == contents(tmp_path / "expected")
+    # Their metadata tell that they are of a painting of other frames.
+    assert paint_of(tmp_path / "out") == paint_of(tmp_path / "expected")
     with Image.open(tmp_path / "film.gif") as pictures:
         assert getattr(pictures, "n_frames", 1) == 2
 
