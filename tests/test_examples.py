@@ -33,3 +33,12 @@ def test_arrays(capsys: pytest.CaptureFixture[str]) -> None:
     example("arrays").main("1")
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(":")[0] for line in lines] == [f"frame {n}" for n in range(1, 6)]
+
+
+@pytest.mark.slow
+def test_a_loss_term_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
+    found = []
+    for weight in ("0", "1000"):
+        example("loss_term").main("20", weight)
+        found.append(float(capsys.readouterr().out.rpartition(": ")[2]))
+    assert found[1] > found[0] + 0.01
