@@ -40,3 +40,12 @@ def test_a_conditioning_field(capsys: pytest.CaptureFixture[str]) -> None:
     example("conditioning_field").main("1")
     lines = [line.partition(":")[0] for line in capsys.readouterr().out.splitlines()]
     assert lines == [f"at {k} K, frame {n}" for k in (1500, 0) for n in (1, 2, 3)]
+
+
+@pytest.mark.slow
+def test_a_loss_term_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
+    found = []
+    for weight in ("0", "1000"):
+        example("loss_term").main("20", weight)
+        found.append(float(capsys.readouterr().out.rpartition(": ")[2]))
+    assert found[1] > found[0] + 0.01

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from vnca.training.presets import preset
     from vnca.training.smoke_config import SmokeConfig
     from vnca.training.smoke_trainer import smoke_trainer
+    from vnca.training.terms import Iteration, Term
     from vnca.training.texture_config import TextureConfig
 
 # Functions that share the name of a subpackage have one of their own here: an imported
@@ -58,6 +59,8 @@ _HOMES = {
     "load": "recipe.recorded",
     "evaluate": "recipe.evaluation",
     "TextureConfig": "training.texture_config",
+    "Iteration": "training.terms",
+    "Term": "training.terms",
     "PaintedFrame": "recipe.stylizing",
     "Evaluation": "recipe.evaluation",
     "FilmConfig": "recipe.film",
@@ -107,6 +110,7 @@ __all__ = [
     "Evaluation",
     "FilmConfig",
     "FilmWriter",
+    "Iteration",
     "Lattice",
     "Model",
     "Orthographic",
@@ -119,6 +123,7 @@ __all__ = [
     "SmokeConfig",
     "SmokeFormat",
     "StylizeConfig",
+    "Term",
     "TextureConfig",
     "Trainer",
     "View",

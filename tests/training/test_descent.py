@@ -124,7 +124,8 @@ def test_training_gives_up_after_three_lower_rates_with_the_last_good_weights(
     def poisoned(self: AppearanceLoss, picture: torch.Tensor, *rest: object) -> Appearance:
         appearance = compare(self, picture, *rest)  # type: ignore[arg-type]
         poison = torch.nan if trainer.iteration > good else 0.0
-        return Appearance(appearance.total * (1 + poison), appearance.terms)
+        terms = {name: term * (1 + poison) for name, term in appearance.terms.items()}
+        return Appearance(appearance.total * (1 + poison), terms)
 
     monkeypatch.setattr(AppearanceLoss, "__call__", poisoned)
     training = trainer.run()

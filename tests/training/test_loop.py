@@ -17,6 +17,7 @@ from vnca.training.preview import preview_sheet
 from vnca.training.scene import Scene
 from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.terms import Iteration, Term
 
 Make = Callable[..., Trainer]
 
@@ -104,7 +105,8 @@ def test_nothing_that_is_not_finite_reaches_a_weight(
             nan = picture.sum() * float("nan")
             # The gradient of the second is NaN, its value zero.
             poison = nan if what == "loss" else torch.sqrt(0 * picture.sum())
-            appearance = Appearance(appearance.total + poison, appearance.terms)
+            terms = {**appearance.terms, "style": appearance.terms["style"] + poison}
+            appearance = Appearance(appearance.total + poison, terms)
         return appearance
 
     monkeypatch.setattr(AppearanceLoss, "__call__", poisoned)
@@ -218,3 +220,21 @@ def test_the_rule_it_gives_is_a_copy(trainer: Make) -> None:
     kept = first.output.copy()
     list(training.run())
     np.testing.assert_array_equal(first.output, kept)
+
+
+def test_a_term_of_ones_own_is_part_of_the_loss(
+    trainer: Make, tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16
+) -> None:
+    class Darkness(Term):
+        name = "darkness"
+
+        def __call__(self, seen: Iteration) -> dict[str, torch.Tensor]:
+            assert list(seen.sums) == ["appearance", "overflow"]
+            return {"darkness": 3 * seen.pictures.mean()}
+
+    plain = next(trainer().run())
+    own = smoke_trainer(tiny_smoke, style, tiny_config, vgg, terms=[Darkness()])
+    judged = next(own.run())
+    assert judged.terms["darkness"] > 0
+    assert judged.loss == pytest.approx(plain.loss + judged.terms["darkness"], rel=1e-5)
+    assert {**judged.terms, "darkness": 0} == {**plain.terms, "darkness": 0}

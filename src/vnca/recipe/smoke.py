@@ -1,6 +1,7 @@
 """Training on smoke as it gives good pictures: first a solid texture, then one frame of smoke."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -43,9 +44,12 @@ from vnca.training.presets import preset as preset_of
 from vnca.training.pretraining import pretraining_config, without_prior_weights
 from vnca.training.smoke_config import SmokeConfig
 from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.terms import Term
 from vnca.training.texture_config import TextureConfig
 
 COMMAND = "train"
+TERMS = "further terms of the loss"
+"""Among the inputs of a training that has some."""
 TEXTURE_FOLDER = "texture"
 """Folder, in that of a run, of the texture that it begins with."""
 TEXTURE_OR_INIT = "`texture`, `init`: one of them, not both"
@@ -92,6 +96,7 @@ def train(
     preview_every: int = 50,
     device: str = "auto",
     memory_budget: str = "auto",
+    terms: Sequence[Term] = (),
     watch: Watch = SILENT,
     **options: Any,
 ) -> Model:
@@ -111,6 +116,8 @@ def train(
         preview_every: Iterations between preview pictures.
         device: `auto`, `cpu` or `cuda`.
         memory_budget: Memory for the program, such as `12GB`.
+        terms: Further terms of the loss on smoke, such as one of your own; they are not written
+            down, and have to be given again to resume.
         watch: Is told how far it has come, and may cancel.
         **options: Fields of `SmokeFormat` (`velocity_units="mantaflow"`) and of `SmokeConfig`
             (`iterations=400`, `texture=0`, `view={"size": 96}`), in the place of the preset's.
@@ -148,8 +155,8 @@ def train(
                 style=asked.style,
                 memory_budget=memory_budget,
             )
-            return resume_run(again, watch, volume=volume, picture=picture)
-    return run(asked, watch, volume=volume, picture=picture)
+            return resume_run(again, watch, volume=volume, picture=picture, terms=terms)
+    return run(asked, watch, volume=volume, picture=picture, terms=terms)
 
 
 def run(
@@ -159,6 +166,7 @@ def run(
     checkpoint: Checkpoint | None = None,
     volume: Volume | None = None,
     picture: FloatArray | None = None,
+    terms: Sequence[Term] = (),
 ) -> Model:
     """Train as asked, or go on from a checkpoint.
 
@@ -168,6 +176,7 @@ def run(
         checkpoint: Where the training was left.
         volume: The frame, if it need not be read.
         picture: The style picture, linear RGB `[r, c, 3]`, if it need not be read.
+        terms: Further terms of the loss on smoke.
 
     Raises:
         VncaError: If an input cannot be used, the run folder cannot be written, training
@@ -198,7 +207,9 @@ def run(
     network = load_network(config.features, device)
     with fitting(config, "this frame"):
         budget = memory_budget(options.memory_budget)
-        trainer = smoke_trainer(smoke, style, config, network, device=device, memory_budget=budget)
+        trainer = smoke_trainer(
+            smoke, style, config, network, device=device, memory_budget=budget, terms=terms
+        )
     training = {
         "frame": options.frame.name,
         "style": options.style.name,
@@ -214,7 +225,7 @@ def run(
         folder=folder,
         style=style,
         training=training,
-        inputs=training_inputs(smoke, style, config, network),
+        inputs=training_inputs(smoke, style, config, network, terms),
         asked=asked(SmokeRun, dataclasses.replace(options, smoke=smoke_format)),
         preview_every=options.preview_every,
         watch=watch,
@@ -247,13 +258,18 @@ def run(
 
 
 def training_inputs(
-    smoke: Volume, style: FloatArray, config: SmokeConfig, network: FeatureNetwork
+    smoke: Volume,
+    style: FloatArray,
+    config: SmokeConfig,
+    network: FeatureNetwork,
+    terms: Sequence[Term] = (),
 ) -> dict[str, str]:
     """What tells a training on smoke from others: the `fingerprints` of what goes into it."""
     frame = [smoke.density, smoke.origin]
     if smoke.velocity is not None:
         frame.append(smoke.velocity)
-    return fingerprints(style, config, network, frame=frame)
+    inputs = fingerprints(style, config, network, frame=frame)
+    return inputs | ({TERMS: ", ".join(term.name for term in terms)} if terms else {})
 
 
 def _texture(
@@ -300,6 +316,7 @@ def resume_run(
     *,
     volume: Volume | None = None,
     picture: FloatArray | None = None,
+    terms: Sequence[Term] = (),
 ) -> Model:
     """Go on with a training, if there is something left to do; see `run` for the arguments.
 
@@ -310,4 +327,4 @@ def resume_run(
     if left is None:
         return load(options.resume)
     begun, checkpoint = left
-    return run(begun, watch, checkpoint=checkpoint, volume=volume, picture=picture)
+    return run(begun, watch, checkpoint=checkpoint, volume=volume, picture=picture, terms=terms)

@@ -136,7 +136,8 @@ class Checkpoint:
         Raises:
             OptionError: If an input is not what it was.
         """
-        changed = [name for name, print_ in inputs.items() if self.inputs.get(name) != print_]
+        names = dict.fromkeys([*inputs, *self.inputs])
+        changed = [name for name in names if self.inputs.get(name) != inputs.get(name)]
         if changed:
             raise OptionError(
                 f"{path}: the {' and the '.join(changed)} changed since this training began; put "

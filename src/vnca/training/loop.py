@@ -3,7 +3,7 @@
 Reference: VNCA sections 3.4 and 5.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,17 +18,16 @@ from vnca.engine.decode_weights import Weights as Decoded
 from vnca.engine.session import Compute, open_session
 from vnca.features.network import FeatureNetwork
 from vnca.losses.appearance import AppearanceLoss
-from vnca.losses.terms import overflow
 from vnca.rule.decoder import Decoder
 from vnca.rule.rule import DENSITY_CHANGE, Rule
 from vnca.training.config import TrainingConfig
 from vnca.training.descent import MOST_ROLLBACKS, Descent
 from vnca.training.memory import states_to_keep
-from vnca.training.motion import MotionSupervision
 from vnca.training.pool import Pool
 from vnca.training.rollout import roll_out
 from vnca.training.scene import Scene
 from vnca.training.snapshot import Snapshot, count
+from vnca.training.terms import AppearanceTerm, Iteration, OverflowTerm, Term
 
 
 @dataclass(frozen=True)
@@ -60,6 +59,7 @@ class Trainer:
         scene: What is trained on.
         session: What computes the automaton; another that does the same may take its place.
         iteration: Iterations done.
+        terms: Those of the loss, in the order in which they are asked.
         kept_states: How many states of a rollout are kept at a time, at most.
     """
 
@@ -71,7 +71,7 @@ class Trainer:
         config: TrainingConfig,
         network: FeatureNetwork,
         *,
-        motion: MotionSupervision | None = None,
+        terms: Sequence[Term] = (),
         memory_budget: int | None = None,
     ) -> None:
         """Prepare training.
@@ -82,7 +82,7 @@ class Trainer:
             style: Linear RGB `[r, c, 3]`.
             config: The hyperparameters.
             network: The frozen network that judges pictures.
-            motion: What judges how they move, if anything does.
+            terms: Further terms of the loss, beside appearance and overflow.
             memory_budget: Bytes that the program may take: rollouts keep as few states as that
                 asks for, and compute the others again. The result is the same to the bit.
 
@@ -117,9 +117,10 @@ class Trainer:
         self._appearance = AppearanceLoss(
             network, style, config.appearance, config.pictures.size, scene.width
         )
-        self._motion = motion
         self._random = np.random.default_rng(config.seed)
         self._generator = torch.Generator().manual_seed(config.seed)
+        own = AppearanceTerm(self._appearance, self._generator), OverflowTerm(config.overflow)
+        self.terms = (*own, *terms)
         self._pool = Pool(scene.seed(config.rule.channels), config.pool, self._random)
         self._descent = self._fresh_descent()
         self._steps = 0  # of all rollouts: no two share a mask
@@ -147,7 +148,7 @@ class Trainer:
     @property
     def teaches_motion(self) -> bool:
         """Whether the rule learns to move as the smoke does."""
-        return self._motion is not None
+        return any(term.name == "motion" for term in self.terms)
 
     @property
     def background(self) -> Tensor:
@@ -219,7 +220,7 @@ class Trainer:
         }
         own = Snapshot({"generator": self._generator.get_state()}, values)
         parts = {name: part.snapshot() for name, part in self._parts().items()}
-        return {"trainer": own, **parts}
+        return {"trainer": own, **{name: part for name, part in parts.items() if part}}
 
     def restore(self, snapshot: Mapping[str, Snapshot]) -> None:
         """Go on from a snapshot of a trainer that was made of the same inputs.
@@ -233,13 +234,14 @@ class Trainer:
         self._random.bit_generator.state = own.values["random"]
         self._generator.set_state(own.tensors["generator"])
         for name, part in self._parts().items():
-            part.restore(snapshot[name])
+            if part.snapshot() is not None:
+                part.restore(snapshot[name])
         self._before = None
 
-    def _parts(self) -> dict[str, Pool | Descent | MotionSupervision]:
-        """What remembers something from one iteration to the next."""
-        parts = {"pool": self._pool, "descent": self._descent}
-        return parts if self._motion is None else {**parts, "motion": self._motion}
+    def _parts(self) -> dict[str, Pool | Descent | Term]:
+        """What may remember something from one iteration to the next."""
+        terms = {term.name: term for term in self.terms}
+        return {"pool": self._pool, "descent": self._descent, **terms}
 
     def _improve(self) -> Progress:
         config = self.config
@@ -250,22 +252,26 @@ class Trainer:
         self._steps += steps
         viewpoint = scene.viewpoint(self._random)
         pictures, opacity = scene.pictures(state, viewpoint, self.background)
-        grey = None
-        if config.appearance.shows_density:
-            grey = scene.density_pictures(state, viewpoint, self.background)
-        appearance = self._appearance(pictures, opacity, self._generator, grey)
-        others = {"overflow": config.overflow * self._overflow(state[:-1])}
-        if self._motion is not None and before.any():  # a state of zeros has no texture to move
-            others["motion"] = self._motion.loss(
-                slot,
-                before,
-                pictures,
-                viewpoint,
-                self.background,
-                frames=steps / config.rule.steps_per_frame,
-                appearance=float(appearance.total.detach()),
-            )
-        loss = appearance.total + torch.stack([*others.values()]).sum()
+        sums: dict[str, Tensor] = {}
+        seen = Iteration(
+            slot=slot,
+            before=before,
+            after=state,
+            frames=steps / config.rule.steps_per_frame,
+            scene=scene,
+            viewpoint=viewpoint,
+            pictures=pictures,
+            opacity=opacity,
+            background=self.background,
+            sums=sums,
+        )
+        terms: dict[str, Tensor] = {}
+        for term in self.terms:
+            if found := term(seen):
+                terms |= found
+                sums[term.name] = torch.stack([*found.values()]).sum()
+        first, *others = sums.values()
+        loss = first + torch.stack(others).sum()
         kept = self._pool.put(slot, state)
         rate = config.rate(self.iteration)
         self.iteration += 1
@@ -273,7 +279,7 @@ class Trainer:
         return Progress(
             iteration=self.iteration,
             loss=float(loss.detach()),
-            terms={k: float(v.detach()) for k, v in {**appearance.terms, **others}.items()},
+            terms={name: float(value.detach()) for name, value in terms.items()},
             exploded=not kept,
             diverged=not went_on,
         )
@@ -294,11 +300,6 @@ class Trainer:
         hidden, bias, output = map(_array, self._weights)
         decoder = self._decoder and Decoder(Decoded(*map(_array, self._decoder)))
         return replace(self._rule, hidden=hidden, bias=bias, output=output, decoder=decoder)
-
-    @staticmethod
-    def _overflow(cells: Tensor) -> Tensor:
-        """States beyond ±1, and beyond ±½ where they are shown: a clamped colour learns nothing."""
-        return overflow(cells) + overflow(2 * cells[:, : DENSITY_CHANGE + 1])
 
 
 def _array(tensor: Tensor) -> FloatArray:

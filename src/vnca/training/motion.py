@@ -18,15 +18,19 @@ from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss
 from vnca.losses.terms import luma
 from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
 from vnca.training.snapshot import Snapshot
+from vnca.training.terms import Iteration, Term
 
 
-class MotionSupervision:
+class MotionSupervision(Term):
     """Judges how the pictures before and after a rollout differ.
 
     Attributes:
+        name: "motion".
         config: What is compared, and how strongly.
         appearance: The latest appearance losses, on which the weight of motion is balanced.
     """
+
+    name = "motion"
 
     def __init__(self, config: MotionConfig, network: FlowNetwork, scene: SmokeScene) -> None:
         """Prepare; `network` is frozen, `scene` says how its smoke moves."""
@@ -34,6 +38,22 @@ class MotionSupervision:
         self.appearance: deque[float] = deque(maxlen=config.balance_over)
         self._network = network
         self._scene = scene
+
+    def __call__(self, seen: Iteration) -> dict[str, Tensor]:
+        """The motion loss; nothing for a state of zeros, which has no texture to move."""
+        if not seen.before.any():
+            return {}
+        appearance = float(seen.sums["appearance"].detach())
+        loss = self.loss(
+            seen.slot,
+            seen.before,
+            seen.pictures,
+            seen.viewpoint,
+            seen.background,
+            frames=seen.frames,
+            appearance=appearance,
+        )
+        return {"motion": loss}
 
     def loss(
         self,

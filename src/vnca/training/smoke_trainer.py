@@ -1,5 +1,6 @@
 """Training on smoke: the trainer of a frame and a picture."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
@@ -16,6 +17,7 @@ from vnca.training.loop import Trainer
 from vnca.training.motion import MotionSupervision
 from vnca.training.scenes.smoke import SmokeScene, velocity_scale
 from vnca.training.smoke_config import SmokeConfig, ViewConfig
+from vnca.training.terms import Term
 
 
 def smoke_trainer(
@@ -26,6 +28,7 @@ def smoke_trainer(
     *,
     device: torch.device | str = "cpu",
     memory_budget: int | None = None,
+    terms: Sequence[Term] = (),
 ) -> Trainer:
     """What trains a rule on one frame and one picture.
 
@@ -36,6 +39,7 @@ def smoke_trainer(
         network: The frozen network that judges pictures.
         device: Where to compute.
         memory_budget: Bytes that the program may take; see `Trainer`.
+        terms: Further terms of the loss.
 
     Raises:
         GridError: If there is no smoke in the frame, or it can have no place on a lattice.
@@ -49,10 +53,9 @@ def smoke_trainer(
         smoke, rule, config.view, augment=config.augment, device=device, backend=config.backend
     )
     rule = replace(rule, place=Region(Lattice(smoke.index_to_world), scene.domain.box))
-    motion = None
     if config.motion.weight and scene.moves:
-        motion = MotionSupervision(config.motion, FlowNetwork.load(device), scene)
-    return Trainer(scene, rule, style, config, network, motion=motion, memory_budget=memory_budget)
+        terms = (MotionSupervision(config.motion, FlowNetwork.load(device), scene), *terms)
+    return Trainer(scene, rule, style, config, network, terms=terms, memory_budget=memory_budget)
 
 
 def choose_scales(smoke: Volume, config: SmokeConfig) -> Scales:
