@@ -142,7 +142,7 @@ def test_the_same_light_falls_the_same_way_again() -> None:
 def test_a_shader_is_lit_as_an_array_is() -> None:
     density, middle = ball(), (SIZE - 1) / 2
     light = LightVolume(density, Light(60.0, 30.0), gamma=2.0)
-    camera = Orthographic((middle,) * 3, 0, 0, height=SIZE)
+    camera = Orthographic((middle, middle, middle), 0, 0, height=SIZE)
     colours = (
         torch.ones(*density.shape, 3),
         lambda points: (torch.ones(len(points)), torch.ones(len(points), 3)),
