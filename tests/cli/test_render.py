@@ -78,8 +78,37 @@ def test_one_frame_is_one_picture(render: Callable[..., Path]) -> None:
 
 
 def test_the_background_is_the_one_asked_for(render: Callable[..., Path]) -> None:
-    image = pixels(render("one.png", "--frames", "2", "--background", "#ff8000"))
+    image = pixels(render("one.png", "--frames", "2", "--background", "#ff8000", "--light", 0))
     np.testing.assert_allclose(image[0, 0], [1, 128 / 255, 0], atol=0.01)
+
+
+def test_the_background_of_lit_smoke_is_darker_in_the_corners(render: Callable[..., Path]) -> None:
+    image = pixels(render("one.png", "--frames", "2", "--background", "#ff8000"))
+    assert 0.5 < image[0, 0, 0] < 0.9
+    assert image[0, 20, 0] > image[0, 0, 0] + 0.05
+    assert image[..., 2].max(1)[0] == 0
+
+
+def test_the_light_comes_from_where_it_is_asked_to(render: Callable[..., Path]) -> None:
+    options = ("--frames", "2", "--gamma", 5, "--transparent")
+    left, right = (
+        pixels(render(f"{at}.png", *options, "--light-azimuth", at))[..., 0] for at in (-90, 90)
+    )
+    assert left[:, :20].mean() > 1.1 * left[:, 20:].mean()
+    assert right[:, 20:].mean() > 1.1 * right[:, :20].mean()
+
+
+def test_shadows_stay_on_the_smoke_while_the_camera_turns(render: Callable[..., Path]) -> None:
+    """The light of a turntable stands: the back is as dark as the front is bright."""
+    film = render(
+        "turn.webp", "--frames", "2", "--gamma", 5, "--light-azimuth", 0, "--turntable", 2
+    )
+    with Image.open(film) as pictures:
+        seen = []
+        for number in range(2):
+            pictures.seek(number)
+            seen.append(np.asarray(pictures.convert("L"), np.float32)[12:20, 16:24].mean())
+    assert seen[0] > 1.2 * seen[1]
 
 
 def test_a_transparent_picture_has_only_smoke_in_it(render: Callable[..., Path]) -> None:
@@ -116,7 +145,7 @@ def test_smoke_is_drawn_in_the_colours_of_its_grid(
             red[..., 0] = 1
             paint = Grid.from_dense("paint", red, active, box.lower, like=density)
             write_vdb(path, [*file.grids.values(), paint])
-    options = ("--frames", "2", "--gamma", 5)
+    options = ("--frames", "2", "--gamma", 5, "--light", 0)
     painted = pixels(render("red.png", *options, "--colour-grid", "paint"))[16, 20]
     assert painted[0] > 0.9
     assert painted[1:].max() < 0.1
@@ -133,6 +162,6 @@ def test_a_frame_without_smoke_is_background(
         nothing = np.zeros((0, 0, 0), np.float32)
         empty = Grid.from_dense("density", nothing, nothing == 0, (0, 0, 0), like=density)
         write_vdb(path, [empty] if has_grid else [])
-    folder = render("frame_#.png").parent
+    folder = render("frame_#.png", "--light", 0).parent
     assert pixels(folder / "frame_1.png").max() < 0.1
     assert pixels(folder / "frame_2.png").max() > 0.5

@@ -18,7 +18,7 @@ from vnca.io.vdb import Grid, Transform, write_vdb
 Vnca = Callable[..., Any]
 CAMERA = (
     *("--rows", 32, "--columns", 32, "--field-of-view", 0),
-    *("--elevation", 0, "--background", "#000000"),
+    *("--elevation", 0, "--background", "#000000", "--light", 0),
 )
 SPACING, THICKNESS, DENSITY = 0.25, 4, 0.2
 GAMMA = 0.7 / 0.9

@@ -28,7 +28,7 @@ SHORT = {
 ASKED = ("-h", "--help", "--help-all")
 """What asks for help."""
 _SMOKE = ("velocity-units", "fps", "up-axis")
-_FILM = ("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background")
+_FILM = ("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background", "light")
 COMMON: Mapping[str, tuple[str, ...]] = {
     "paint": (
         *("out", "style", "preset", "training-frame", "frames", "refine", "seed", *_SMOKE),

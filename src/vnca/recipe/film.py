@@ -1,6 +1,7 @@
 """Filming painted frames as they come; torch is needed once there is something to film."""
 
 from dataclasses import dataclass
+from math import inf, isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,6 +14,7 @@ from vnca.core.shot import Shot, parse_colour
 from vnca.core.typing import AnyArray, FloatArray
 from vnca.core.volume import Volume
 from vnca.io.film import FilmWriter
+from vnca.rendering.background import soft_background
 
 if TYPE_CHECKING:
     import torch
@@ -29,6 +31,16 @@ class FilmConfig(Shot):
     step: float = 0.5
     """Distance between samples along a ray, in cells, across where these are thinnest; a surface
     shows terraces where it is long."""
+    light: float = 1.2
+    """Strength of a light that the smoke is seen by and throws shadows in. 0: none, the smoke glows
+    in its own colours before an even background."""
+    light_azimuth: float = -55.0
+    """Where the light stands, degrees around the smoke from where the camera begins; it stays there
+    while the camera turns. Below 0 it comes from the left."""
+    light_elevation: float = 40.0
+    """How far above the horizon it stands, degrees."""
+    ambient: float = 0.15
+    """Part of the light that comes from everywhere, 0 to 1: how bright shadows are."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -36,6 +48,20 @@ class FilmConfig(Shot):
             raise OptionError(f"`film.field_of_view` {self.field_of_view}: must be 0 to 120")
         if not 0 < self.step <= 4:
             raise OptionError(f"`film.step` {self.step}: must be above 0, at most 4 cells")
+        if not 0 <= self.light < inf:
+            raise OptionError(f"`film.light` {self.light}: must be 0 or more")
+        if not isfinite(self.light_azimuth):
+            raise OptionError("`film.light_azimuth`: expected a number of degrees")
+        if not -90 <= self.light_elevation <= 90:
+            raise OptionError(
+                f"`film.light_elevation` {self.light_elevation}: must be -90 to 90 degrees"
+            )
+        if not 0 <= self.ambient <= 1:
+            raise OptionError(f"`film.ambient` {self.ambient}: must be 0 to 1")
+        if not self.light:
+            for name in ("light_azimuth", "light_elevation", "ambient"):
+                if getattr(self, name) != getattr(FilmConfig, name):
+                    raise OptionError(f"`film.{name}`: changes nothing where `film.light` is 0")
 
 
 class Shown(NamedTuple):
@@ -90,6 +116,7 @@ class Film:
             ) from error
         self._config, self._bounds, self._frames, self._device = config, bounds, frames, device
         self._writer = FilmWriter(path, fps=config.fps)
+        self._background = behind(config)
         self._shown = 0
 
     def __enter__(self) -> "Film":
@@ -115,8 +142,16 @@ class Film:
             turned=self._config.turn * self._shown / self._frames,
             device=self._device,
         )
-        self._writer.add(view.over(parse_colour(self._config.background)).cpu().numpy())
+        self._writer.add(view.over(self._background).cpu().numpy())
         self._shown += 1
+
+
+def behind(config: FilmConfig) -> FloatArray:
+    """What is behind smoke, linear RGB: `[3]`, or `[rows, columns, 3]` where it is lit."""
+    colour = parse_colour(config.background)
+    if not config.light:
+        return np.array(colour)
+    return soft_background(colour, config.rows, config.columns)
 
 
 def picture(
@@ -130,6 +165,7 @@ def picture(
     """The view of one frame by a camera framed on `bounds` that has turned by some degrees."""
     import torch
 
+    from vnca.rendering.light import Light, LightVolume, spacing_for
     from vnca.rendering.view import render
 
     density, colour, place = frame.smoke.density, frame.colour, frame.smoke.cells_to_world
@@ -147,16 +183,33 @@ def picture(
     )
     if density.size == 0:
         density, colour = np.zeros((1, 1, 1), np.float32), np.zeros((1, 1, 1, 3), np.float32)
+    smoke, gamma = torch.from_numpy(density).to(device), frame.extinction * thinnest
+    light = None
+    if config.light:
+        light = LightVolume(
+            smoke,
+            Light(
+                config.azimuth + config.light_azimuth,
+                config.light_elevation,
+                config.light,
+                config.ambient,
+            ),
+            gamma=gamma,
+            cells_to_world=place,
+            spacing=spacing_for(*bounds) / thinnest,
+            origin=frame.smoke.origin,
+        )
     with torch.no_grad():
         return render(
-            torch.from_numpy(density).to(device),
+            smoke,
             torch.from_numpy(colour).to(device),
             camera,
             rows=config.rows,
             columns=config.columns,
-            gamma=frame.extinction * thinnest,
+            gamma=gamma,
             step=config.step,
             cells_to_world=place,
+            light=light,
         )
 
 

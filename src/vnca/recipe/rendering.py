@@ -13,7 +13,6 @@ import numpy as np
 from vnca.core.errors import OptionError, SequenceError
 from vnca.core.files import existing_file, writable_file
 from vnca.core.records import changed_fields
-from vnca.core.shot import parse_colour
 from vnca.core.typing import FloatArray
 from vnca.core.watch import SILENT, Watch, tracked
 from vnca.io.film import SUFFIXES as FILMS
@@ -25,7 +24,7 @@ from vnca.io.provenance import read_provenance
 from vnca.io.sequence import FrameSequence
 from vnca.io.smoke import SmokeFormat
 from vnca.io.smoke_format import NO_VELOCITY, UpAxis
-from vnca.recipe.film import Bounds, Film, FilmConfig, Shown, picture
+from vnca.recipe.film import Bounds, Film, FilmConfig, Shown, behind, picture
 from vnca.recipe.options import changed
 from vnca.recipe.sequence import open_sequence, region_bounds, sequence_bounds, volumes
 from vnca.recipe.stylizing import PaintedFrame
@@ -276,7 +275,7 @@ def _pictures(shown: Iterator[Shown], bounds: Bounds, options: RenderRun) -> Non
 
 def _picture(frame: Shown, bounds: Bounds, options: RenderRun) -> FloatArray:
     view = picture(frame, options.film, bounds=bounds, turned=0.0)
-    image = view.rgba if options.transparent else view.over(parse_colour(options.film.background))
+    image = view.rgba if options.transparent else view.over(behind(options.film))
     return image.cpu().numpy()
 
 

@@ -14,6 +14,7 @@ from vnca.core.camera import Camera
 from vnca.core.errors import OptionError, ShapeError
 from vnca.core.typing import AnyArray
 from vnca.rendering.composite import gather, ray_weights
+from vnca.rendering.light import LightVolume
 from vnca.rendering.march import Samples, march
 from vnca.rendering.paper import paper_weights
 from vnca.rendering.sample import sample
@@ -50,7 +51,9 @@ class View:
     opacity: Float[Tensor, "rows columns"]
     depth: Float[Tensor, "rows columns"]
 
-    def over(self, background: Tensor | Sequence[float]) -> Float[Tensor, "rows columns 3"]:
+    def over(
+        self, background: Tensor | AnyArray | Sequence[float]
+    ) -> Float[Tensor, "rows columns 3"]:
         """The view in front of a linear RGB colour or picture `[..., 3]`. Differentiable."""
         behind = torch.as_tensor(background, dtype=self.colour.dtype, device=self.colour.device)
         return self.colour + (1 - self.opacity)[..., None] * behind
@@ -74,6 +77,7 @@ def render(
     mode: Mode = "emission-absorption",
     cells_to_world: AnyArray | None = None,
     supersampling: int = 1,
+    light: LightVolume | None = None,
 ) -> View:
     """Render smoke by emission and absorption.
 
@@ -103,12 +107,16 @@ def render(
             then in cells.
         supersampling: Rays along the rows and the columns of a pixel, whose samples begin at
             different depths; the view is their mean.
+        light: What lights the smoke; unless given it glows in its own colours. It passes no
+            gradients on.
 
     Raises:
-        ShapeError: If density and colour do not cover the same cells.
+        ShapeError: If density, colour and light do not cover the same cells.
         OptionError: If an option is out of range.
     """
     _check(density, colour, rows, columns, gamma, step, offset, mode)
+    if light is not None:
+        light.check(density)
     if supersampling > 1:
         return _supersampled(
             density,
@@ -122,6 +130,7 @@ def render(
             offset=offset,
             mode=mode,
             cells_to_world=cells_to_world,
+            light=light,
         )
     return _render(
         density,
@@ -134,6 +143,7 @@ def render(
         offset=offset,
         mode=mode,
         cells_to_world=cells_to_world,
+        light=light,
     )
 
 
@@ -177,6 +187,7 @@ def _render(
     offset: float | Tensor,
     mode: Mode,
     cells_to_world: AnyArray | None,
+    light: LightVolume | None,
 ) -> View:
     """A ray through the middle of each pixel; `offset` of all, or of each of them."""
     origins, directions = (
@@ -195,6 +206,8 @@ def _render(
             hue = values[..., 1:] / thickness[..., None].clamp_min(_THINNEST)
         else:
             thickness, hue = _shaded(field, colour, samples, gamma * step)
+        if light is not None:
+            hue = hue * _lit(light, samples, gamma * step * thickness)
         if mode == "paper":
             weights, transmittance = paper_weights(thickness, gamma=gamma)
         else:
@@ -233,6 +246,16 @@ def _shaded(
     painted = torch.cat([plain[seen] * factors[:, None], hues], -1)
     table = samples.table(values.index_put((seen,), painted))
     return table[..., 0], table[..., 1:]
+
+
+@torch.no_grad()
+def _lit(light: LightVolume, samples: Samples, thickness: Tensor) -> Tensor:
+    """What the colours `[rays, samples, 3]` that can be seen are multiplied by; others by one."""
+    reached = torch.cumsum(thickness, 1) - thickness
+    seen = ((reached < -math.log(_UNSEEN)) & (thickness > 0))[samples.row, samples.column]
+    factors = thickness.new_ones(len(samples.points))
+    factors[seen] = light.at(samples.points[seen])
+    return samples.table(factors[:, None])
 
 
 def _through_cells(
