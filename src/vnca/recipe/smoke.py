@@ -20,6 +20,7 @@ from vnca.io.picture import read_style, style_array
 from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY, on_lattice
 from vnca.recipe import texture
+from vnca.recipe.grafting import rule_like
 from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY, load
 from vnca.recipe.sequence import beside, read_alone
@@ -31,7 +32,6 @@ from vnca.recipe.session import (
     choose_device,
     fitting,
     interrupted,
-    rule_like,
     run_folder,
     shown_and_judged,
 )

@@ -13,6 +13,7 @@ from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.picture import read_style, style_array
 from vnca.io.smoke_format import UpAxis
 from vnca.painting.block import KIND
+from vnca.recipe.grafting import graft
 from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY
 from vnca.recipe.session import (
@@ -22,7 +23,6 @@ from vnca.recipe.session import (
     asked,
     choose_device,
     fitting,
-    graft,
     interrupted,
     run_folder,
     shown_and_judged,
