@@ -22,8 +22,8 @@ from vnca.recipe.stylizing import stylize
 from vnca.training.presets import DEFAULT, preset
 from vnca.training.smoke_config import SmokeConfig
 
-STYLE = "vangogh_cafe_terrace.webp"
-"""A painting in the package, in the public domain."""
+STYLE = "rust.webp"
+"""A picture in the package that no style of its library has learned."""
 
 SHEET_SIZE = 256
 """Rows and columns of a picture on the contact sheet, pixels."""
@@ -98,16 +98,8 @@ def demonstrate(options: Demo) -> None:
 
 def _config(options: Demo) -> SmokeConfig:
     config = replace(preset(SmokeConfig, DEFAULT), seed=options.seed)
-    if not options.quick:
-        return config
-    return replace(
-        config,
-        iterations=60,
-        texture=1.0,
-        view=replace(config.view, size=96),
-        rule=replace(config.rule, hidden=64),
-        longest_rollout=24,
-    )
+    iterations = 15 if options.quick else 50
+    return replace(config, iterations=iterations, texture=3.0)
 
 
 def _sheet(style: FloatArray, options: RenderRun, watch: Watch) -> FloatArray:
