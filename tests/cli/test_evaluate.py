@@ -87,7 +87,7 @@ def test_what_a_run_was_trained_on_is_what_it_is_measured_on(
     vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
 ) -> None:
     run = tmp_path / "trained"
-    trained = (*tiny, "--view.gamma", "3", "--appearance.style-scale", "1")
+    trained = (*tiny, "--view.gamma", "3", "--appearance.style-scale", "2")
     assert vnca("train", frame, style, "--out", run, *trained).code == 0
     evaluated = ("evaluate", run, "--velocity-grid", "none", "--size", "112", *FEW)
     outcome = vnca(*evaluated)
@@ -100,8 +100,9 @@ def test_what_a_run_was_trained_on_is_what_it_is_measured_on(
     assert list(measures["style.by_edges"]["frames"]) == ["2"]
     assert measures["time.warp_short"]["reason"] == "it takes 2 frames in a row"
     assert "Not measured" in (run / "evaluation" / "report.html").read_text()
-    # The picture is compared as large as it was shown in training: as a finer grid has it.
-    assert "--size 112: makes the picture" in vnca(*evaluated, "--refine", "2").complaint
+    # The picture is compared as large as it was shown in training, and as its cells are.
+    small = (*evaluated[: -len(FEW) - 1], "64", *FEW)
+    assert "--size 64: makes the picture" in vnca(*small).complaint
     fine = ("--refine", "2", "--style-scale", "0.6", "--out", run / "fine")
     assert vnca(*evaluated, *fine).code == 0
     assert "2 times as fine" in (run / "fine" / "report.html").read_text()

@@ -129,7 +129,7 @@ def test_something_else_is_not_gone_on_with(job: Job) -> None:
     assert job.run().code == 0
     before = job.files
     assert "--seed is another" in job.run("--resume", "--seed", 1).complaint
-    assert "--refine is another" in job.run("--resume", "--refine", 2).complaint
+    assert "--refine is another" in job.run("--resume", "--refine", 3).complaint
     job.preset.write_text(TINY.replace("hidden = 8", "hidden = 9"))
     assert "--preset is another" in job.run("--resume").complaint
     assert job.files == before

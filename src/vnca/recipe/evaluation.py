@@ -244,8 +244,11 @@ def run(
     rule = placed(rule, given.region, watch)
     refine = options.refine
     # Once for where the smoke is, and once to paint: there may be too many frames to keep.
-    setup = Setup.around(given.read(None), rule, options.size).refined(refine)
-    metric = StyleMetric(picture, _checked_size(width(setup), f"`size` {options.size}"))
+    setup = Setup.around(given.read(None), rule, options.size)
+    # A decoder leaves cells, and what is drawn in them, as large as they are.
+    cells = 1 if rule.decoder is not None else refine
+    pixels = _checked_size(width(setup.refined(cells)), f"`size` {options.size}")
+    setup, metric = setup.refined(refine), StyleMetric(picture, pixels)
     paintings = stylize(
         given.read(StillSmoke(rule, options.smoke, watch.note)),
         rule,
@@ -256,7 +259,6 @@ def run(
     )
     paintings = tracked(paintings, watch, "painting and measuring", given.count, "frames")
     judges = _judges(model, metric, options.size)
-    cells = 1 if rule.decoder is not None else refine
     found = survey(paintings, given.count, rule.refined(cells), setup, metric, judges)
     listed = measures(found)
     watch.note(f"trained with features '{model.training.get('features', 'unknown')}'")
