@@ -179,7 +179,7 @@ def test_the_native_kernel_and_the_reference_learn_alike(trainer: Make) -> None:
     for training in (native, reference):
         list(training.run())
     for ours, theirs in zip(weights(native), weights(reference), strict=True):
-        np.testing.assert_allclose(ours, theirs, atol=2e-4)
+        np.testing.assert_allclose(ours, theirs, atol=5e-4)
 
 
 @pytest.mark.parametrize("backend", ["native", "reference"])
