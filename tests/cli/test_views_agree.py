@@ -16,10 +16,11 @@ from vnca.io.smoke import write_smoke
 from vnca.io.vdb import Grid, Transform, write_vdb
 
 Vnca = Callable[..., Any]
-CAMERA = (
+PLACE = (
     *("--rows", 32, "--columns", 32, "--field-of-view", 0),
-    *("--elevation", 0, "--background", "#000000", "--light", 0),
+    *("--elevation", 0, "--light", 0),
 )
+CAMERA = (*PLACE, "--background", "#000000")
 SPACING, THICKNESS, DENSITY = 0.25, 4, 0.2
 GAMMA = 0.7 / 0.9
 """Of the model made up for these tests: extinction of density 1 in the file, per cell."""
@@ -129,7 +130,7 @@ def write(folder: Path, density: AnyArray, matrix: AnyArray, origin: Index = (0,
 
 def picture(vnca: Vnca, source: Path, *options: object) -> AnyArray:
     path = source / "seen.png"
-    assert vnca("render", source, "--out", path, *CAMERA, "--transparent", *options).code == 0
+    assert vnca("render", source, "--out", path, *PLACE, "--transparent", *options).code == 0
     with Image.open(path) as image:
         return np.asarray(image, np.float32) / 255
 
