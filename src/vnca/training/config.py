@@ -56,7 +56,7 @@ class TrainingConfig(ABC):
     """Units in each layer of the decoder, which draws between cells what is finer than they are;
     0 for none: cells are then interpolated."""
     graft: str = "none"
-    """The rule of another picture that the texture starts from, which takes a third of the
+    """The rule of another picture that the texture starts from, which takes fewer
     iterations: a style of the library, a model, auto for the nearest style that fits, or none."""
     iterations: int = 400
     """Iterations of training."""
