@@ -22,9 +22,10 @@ from vnca.recipe import painting
 from vnca.recipe.film import FilmConfig
 from vnca.recipe.options import changed, distributed
 from vnca.recipe.recorded import recorded, recorded_smoke
+from vnca.recipe.rendering import CELL_OPACITY
 from vnca.recipe.sequence import open_sequence
 from vnca.rendering.brightness import gamma_for_cell_opacity
-from vnca.rule.library import load_style
+from vnca.rule.library import load_style, require_style
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.rule import SMOKE_THRESHOLD, density_scale
 
@@ -34,8 +35,6 @@ RUN, PAINTED, FILM = "run", "painted", "film.mp4"
 ASKED_NAME = "paint.json"
 """In the folder: what was asked for, to go on with nothing else."""
 MODEL_SUFFIX = ".safetensors"
-CELL_OPACITY = 0.95
-"""Of a typical cell, for smoke painted in a style of the library: what those were trained at."""
 LOOKED_AT = 12
 """Frames, at most, of which the one with the most smoke is trained on."""
 _OF_TRAINING = ("preset", "training_frame", "device", "memory_budget")
@@ -82,7 +81,7 @@ class PaintRun:
         if (self.picture is None) == (self.style is None):
             raise OptionError("`picture`, `style`: expected one of them")
         if self.style is not None:
-            load_style(self.style)
+            require_style(self.style)
         if self.resume and self.overwrite:
             raise OptionError("`resume`, `overwrite`: one of them, not both")
         idle = [n for n in _OF_TRAINING if getattr(self, n) != getattr(PaintRun, n)]
@@ -315,7 +314,7 @@ def _fitted(options: PaintRun, sequence: FrameSequence) -> _Scales:
     seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
     density = read_smoke(_training_frame(options, sequence).path, seen).density_field.values
     scale = density_scale(density)
-    return _Scales(scale, gamma_for_cell_opacity(density / scale, CELL_OPACITY))
+    return _Scales(scale, gamma_for_cell_opacity(density / scale, CELL_OPACITY["painted"]))
 
 
 def _training_frame(options: PaintRun, sequence: FrameSequence) -> Frame:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import torch
@@ -117,53 +117,29 @@ def render(
     _check(density, colour, rows, columns, gamma, step, offset, mode)
     if light is not None:
         light.check(density)
-    if supersampling > 1:
-        return _supersampled(
-            density,
-            colour,
-            camera,
-            supersampling,
-            rows=rows,
-            columns=columns,
-            gamma=gamma,
-            step=step,
-            offset=offset,
-            mode=mode,
-            cells_to_world=cells_to_world,
-            light=light,
-        )
-    return _render(
-        density,
-        colour,
-        camera,
-        rows=rows,
-        columns=columns,
-        gamma=gamma,
-        step=step,
-        offset=offset,
-        mode=mode,
-        cells_to_world=cells_to_world,
-        light=light,
-    )
-
-
-def _supersampled(
-    density: Tensor, colour: Tensor | Shader, camera: Camera, along: int, **options: Any
-) -> View:
-    """The mean of the rays of each pixel."""
-    rows, columns = options.pop("rows"), options.pop("columns")
-    offset = density.new_tensor(options.pop("offset"))
-    stagger = torch.arange(along**2, device=density.device) * _STAGGER
-    offsets = ((offset + stagger) % 1).view(along, along).repeat(rows, columns).view(-1)
+    along, offsets = supersampling, offset
+    if along > 1:
+        stagger = torch.arange(along**2, device=density.device) * _STAGGER
+        offsets = (density.new_tensor(offset) + stagger) % 1
+        offsets = offsets.view(along, along).repeat(rows, columns).view(-1)
     view = _render(
         density,
         colour,
         camera,
         rows=along * rows,
         columns=along * columns,
+        gamma=gamma,
+        step=step,
         offset=offsets,
-        **options,
+        mode=mode,
+        cells_to_world=cells_to_world,
+        light=light,
     )
+    return view if along == 1 else _averaged(view, rows, columns, along)
+
+
+def _averaged(view: View, rows: int, columns: int, along: int) -> View:
+    """A view of pixels of which each is the mean of `along` × `along` rays."""
 
     def mean(values: Tensor) -> Tensor:
         shape = (rows, along, columns, along, *values.shape[2:])

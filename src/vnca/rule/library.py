@@ -20,14 +20,20 @@ def style_names() -> list[str]:
     return sorted(name.removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX))
 
 
+def require_style(name: str) -> None:
+    """Raise `OptionError` unless there is a style of that name."""
+    names = style_names()
+    if name not in names:
+        raise OptionError(f"`style` {name}: expected one of {', '.join(names)}")
+
+
 def load_style(name: str) -> Model:
     """A style of the library.
 
     Raises:
         OptionError: If there is none of that name.
     """
-    if name not in style_names():
-        raise OptionError(f"`style` {name}: expected one of {', '.join(style_names())}")
+    require_style(name)
     with as_file(_FOLDER.joinpath(name + SUFFIX)) as path:
         return Model.load(path)
 

@@ -215,15 +215,8 @@ class SmokeScene(Scene[SmokeViewpoint]):
 
         Reference: VNCA, the equations for I and for L_app.
         """
-        if self.decoder is None:
-            density = self._painted_density(state)
-            white: Tensor | Shader = density.new_ones(1).expand(*density.shape, 3)
-        else:
-            density = self.dense(self._density)
-            white = partial(self._shade, state, white=True)
         view = render(
-            density,
-            white,
+            *self._coloured(state, white=True),
             viewpoint.camera,
             rows=self.view.size,
             columns=self.view.size,
@@ -255,15 +248,8 @@ class SmokeScene(Scene[SmokeViewpoint]):
         `view` is that of training unless given; `offset` shifts all samples along their rays.
         """
         view = view or self.view
-        if self.decoder is None:
-            density = self._painted_density(state)
-            colour: Tensor | Shader = self.dense(colours(state[:-1]))
-        else:
-            density = self.dense(self._density)
-            colour = partial(self._shade, state)
         return render(
-            density,
-            colour,
+            *self._coloured(state),
             camera,
             rows=view.size,
             columns=view.size,
@@ -280,6 +266,15 @@ class SmokeScene(Scene[SmokeViewpoint]):
         """Of what is as fine as cells, one ray a pixel shows everything."""
         return 1 if self.decoder is None else self.view.supersampling
 
+    def _coloured(self, state: Tensor, *, white: bool = False) -> tuple[Tensor, Tensor | Shader]:
+        """Density and colour as `vnca.rendering.view.render` takes them."""
+        if self.decoder is not None:
+            return self.dense(self._density), partial(self._shade, state, white=white)
+        density = self._painted_density(state)
+        if white:
+            return density, density.new_ones(1).expand(*density.shape, 3)
+        return density, self.dense(colours(state[:-1]))
+
     def _shade(
         self, state: Tensor, points: Tensor, *, white: bool = False
     ) -> tuple[Tensor, Tensor]:
@@ -288,6 +283,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
         hues = seen.new_ones(len(seen), 3) if white else colours(seen)
         return density_factors(seen), hues
 
+    @torch.no_grad()
     def motion(self, state: Tensor, viewpoint: SmokeViewpoint, size: int) -> tuple[Tensor, Tensor]:
         """How the smoke that `pictures` shows moves: pixels per frame `[r, c, 2]`, and opacity.
 
