@@ -343,6 +343,21 @@ def test_a_texture_that_is_trained_already_is_what_training_begins_with(
     assert (given / MODEL_NAME).read_bytes() == (both / MODEL_NAME).read_bytes()
 
 
+def test_a_model_of_smoke_goes_on_with_what_it_has_learnt_of_smoke(
+    vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
+) -> None:
+    first, then = tmp_path / "first", tmp_path / "then"
+    assert vnca("train", frame, style, "--out", first, *tiny, "--texture", 0).code == 0
+    on = (*tiny[: tiny.index("--texture")], "--iterations", 1, "--init", first)
+    assert vnca("train", frame, style, "--out", then, *on).code == 0
+    before, after = (Model.load(run).rule for run in (first, then))
+    told = before.config.inputs - before.config.conditioning_width
+    learnt = before.hidden[:, told:]
+    assert (learnt != 0).any()
+    # One iteration moves a weight by no more than the rate.
+    assert abs(after.hidden[:, told:] - learnt).max() < abs(learnt).max() / 4
+
+
 def test_a_texture_that_cannot_be_begun_with_is_refused(
     vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
 ) -> None:

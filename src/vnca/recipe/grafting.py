@@ -13,8 +13,10 @@ from vnca.training.loop import Trainer
 from vnca.training.pretraining import AUTO, SHAPE, without_prior_weights
 
 
-def rule_like(path: Path, wanted: Rule) -> Rule:
-    """The rule of a model to start from.
+def rule_to_go_on_with(path: Path, wanted: Rule) -> Rule:
+    """The rule of a model that a training on smoke begins with.
+
+    A rule of smoke keeps what it has learnt of priors; a texture has had none.
 
     Args:
         path: Of the model, or of the folder of its run.
@@ -27,7 +29,11 @@ def rule_like(path: Path, wanted: Rule) -> Rule:
     misfit = _misfit(rule, wanted)
     if misfit is not None:
         raise OptionError(f"`init` {path}: {misfit}")
-    return rule
+    its = rule.config
+    knows_smoke = any(its.is_conditioned_on(name) for name in its.conditioning)
+    if knows_smoke and its.conditioning == wanted.config.conditioning:
+        return rule
+    return without_prior_weights(rule, wanted.config.conditioning)
 
 
 def _misfit(rule: Rule, wanted: Rule) -> str | None:

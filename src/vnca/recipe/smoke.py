@@ -20,7 +20,7 @@ from vnca.io.picture import read_style, style_array
 from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY, on_lattice
 from vnca.recipe import texture
-from vnca.recipe.grafting import rule_like
+from vnca.recipe.grafting import rule_to_go_on_with
 from vnca.recipe.options import distributed
 from vnca.recipe.recorded import IN_MEMORY, load
 from vnca.recipe.sequence import beside, read_alone
@@ -66,8 +66,8 @@ class SmokeRun(TrainingOptions):
     preset: str = DEFAULT
     """Values of all hyperparameters that are not given: draft, standard, paper, or a TOML file."""
     init: Path | None = None
-    """A solid texture of the picture that is trained already, to begin with instead of training
-    one as `texture` says."""
+    """A model that is trained already, to begin with instead of training a texture as `texture`
+    says: a solid texture of the picture, or a model of smoke, which goes on learning."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: SmokeConfig = field(default_factory=SmokeConfig)
@@ -109,7 +109,8 @@ def train(
             written, and a training that is cancelled is lost.
         preset: `draft` takes minutes, `standard` a night on a laptop; `paper` is the paper's. Or
             the path of a TOML file.
-        init: A texture model of the picture to begin with, instead of training one first.
+        init: A texture model of the picture to begin with, instead of training one first; or a
+            model of smoke, which goes on learning.
         overwrite: Replace the run that `out` holds.
         resume: Go on with the training that was interrupted in `out`, with the options that it
             began with, or else begin it.
@@ -235,9 +236,7 @@ def run(
             checkpoint.require(session.inputs, folder.checkpoint_path)
         beginning = pretraining_config(config, trainer.picture_cells)
         if options.init is not None:
-            wanted = trainer.rule()
-            begun = rule_like(options.init, wanted)
-            trainer.begin_with(without_prior_weights(begun, wanted.config.conditioning))
+            trainer.begin_with(rule_to_go_on_with(options.init, trainer.rule()))
         elif beginning is not None:
             if checkpoint is None and options.overwrite and options.out is not None:
                 # Resuming must not take the texture of the run that was there for this one's.
