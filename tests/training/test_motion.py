@@ -5,13 +5,9 @@ import pytest
 import torch
 from torch.nn import functional
 
-from vnca.core.volume import Volume
 from vnca.features.flow import FlowNetwork
 from vnca.losses.motion import Motion, MotionConfig
-from vnca.rule.rule import Rule, RuleConfig, Scales
 from vnca.training.motion import MotionSupervision, _shrunk
-from vnca.training.scenes.smoke import SmokeScene
-from vnca.training.smoke_config import ViewConfig
 from vnca.training.snapshot import Snapshot
 
 CONFIG = MotionConfig(weight=0.5, balance_over=3)
@@ -22,15 +18,9 @@ def network() -> FlowNetwork:
     return FlowNetwork.load()
 
 
-@pytest.fixture(scope="module")
-def scene(tiny_smoke: Volume) -> SmokeScene:
-    rule = Rule.initial(RuleConfig(channels=6, hidden=8), Scales(gamma=3.0), seed=0)
-    return SmokeScene(tiny_smoke, rule, ViewConfig(size=64))
-
-
 @pytest.fixture
-def supervision(network: FlowNetwork, scene: SmokeScene) -> MotionSupervision:
-    return MotionSupervision(CONFIG, network, scene)
+def supervision(network: FlowNetwork) -> MotionSupervision:
+    return MotionSupervision(CONFIG, network)
 
 
 def texture(shift: float = 0.0, size: int = 64) -> torch.Tensor:
@@ -81,9 +71,7 @@ def test_the_weight_follows_the_median_appearance_loss(supervision: MotionSuperv
     wrong = Motion(torch.tensor(1.0), torch.tensor(0.0))
     weights = [float(supervision.weighted(wrong, loss)) for loss in (4, 8, 100, 9, 10)]
     assert weights == [2, 3, 4, 4.5, 5]
-    absolute = MotionSupervision(
-        replace(CONFIG, balance_over=0), supervision._network, supervision._scene
-    )
+    absolute = MotionSupervision(replace(CONFIG, balance_over=0), supervision._network)
     assert float(absolute.weighted(wrong, 100.0)) == 0.5
 
 
@@ -99,7 +87,7 @@ def test_a_snapshot_goes_on_with_the_same_balance(supervision: MotionSupervision
     wrong = Motion(torch.tensor(1.0), torch.tensor(0.0))
     for loss in (4.0, 8.0, 6.0):
         supervision.weighted(wrong, loss)
-    other = MotionSupervision(CONFIG, supervision._network, supervision._scene)
+    other = MotionSupervision(CONFIG, supervision._network)
     other.restore(supervision.snapshot())
     assert float(other.weighted(wrong, 1.0)) == float(supervision.weighted(wrong, 1.0))
     with pytest.raises(ValueError, match="finite"):

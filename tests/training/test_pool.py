@@ -15,33 +15,33 @@ def pool(size: int = 4, reseed_every: int = NEVER, limit: float = 4.0) -> Pool:
 
 def test_every_state_starts_as_the_seed() -> None:
     states = pool()
-    assert all(states.draw(1)[1] is SEED for _ in range(20))
+    assert all(states.draw(1).state is SEED for _ in range(20))
 
 
 def test_a_state_that_was_returned_is_drawn_again_without_its_gradient() -> None:
     states = pool(size=1)
-    slot, _ = states.draw(1)
+    slot = states.draw(1).slot
     grown = torch.full_like(SEED, 0.5, requires_grad=True)
     assert states.put(slot, grown * 2)
-    _, again = states.draw(2)
+    again = states.draw(2).state
     assert torch.equal(again, torch.ones_like(SEED))
     assert not again.requires_grad
 
 
-def test_places_do_not_share_a_state() -> None:
+def test_slots_do_not_share_a_state() -> None:
     states = pool(size=8)
-    slot, _ = states.draw(1)
+    slot = states.draw(1).slot
     states.put(slot, torch.ones_like(SEED))
-    for other, state in (states.draw(2) for _ in range(50)):
+    for other, _, state in (states.draw(2) for _ in range(50)):
         assert torch.equal(state, torch.ones_like(SEED) if other == slot else SEED)
 
 
 def test_every_so_many_iterations_the_seed_is_drawn_and_its_old_state_forgotten() -> None:
     states = pool(size=1, reseed_every=8)
     states.put(0, torch.ones_like(SEED))
-    assert bool(states.draw(7)[1].any())
-    assert not states.draw(8)[1].any()
-    assert not states.draw(9)[1].any()
+    assert bool(states.draw(7).state.any())
+    assert not states.draw(8).state.any()
+    assert not states.draw(9).state.any()
 
 
 @pytest.mark.parametrize("value", [4.5, -4.5, float("nan"), float("inf")])
@@ -51,9 +51,32 @@ def test_an_exploded_state_is_thrown_away(value: float) -> None:
     exploded = torch.zeros_like(SEED)
     exploded[2, 3] = value
     assert not states.put(0, exploded)
-    assert not states.draw(1)[1].any()
+    assert not states.draw(1).state.any()
 
 
-def test_all_places_are_drawn() -> None:
+def test_all_slots_are_drawn() -> None:
     states = pool(size=8)
-    assert {states.draw(1)[0] for _ in range(200)} == set(range(8))
+    assert {states.draw(1).slot for _ in range(200)} == set(range(8))
+
+
+def test_each_seed_begins_a_life_that_no_state_has_led() -> None:
+    states = pool(size=2, reseed_every=10)
+    lives = []
+    for iteration in range(1, 60):
+        slot, life, _ = states.draw(iteration)
+        states.put(slot, torch.ones_like(SEED))
+        lives.append(life)
+    assert set(lives[:9]) == {0, 1}
+    assert set(lives) == set(range(2 + 5))
+
+
+def test_lives_go_on_from_a_snapshot() -> None:
+    states, again = pool(size=2, reseed_every=2), pool(size=2, reseed_every=2)
+    for iteration in range(1, 9):
+        states.put(states.draw(iteration).slot, torch.ones_like(SEED))
+    again.restore(states.snapshot())
+    again._random = np.random.default_rng()
+    again._random.bit_generator.state = states._random.bit_generator.state
+    assert [states.draw(i)[:2] for i in range(9, 30)] == [again.draw(i)[:2] for i in range(9, 30)]
+    with pytest.raises(ValueError, match="lives"):
+        pool(size=3).restore(states.snapshot())

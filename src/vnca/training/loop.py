@@ -245,16 +245,15 @@ class Trainer:
 
     def _improve(self) -> Progress:
         config = self.config
-        slot, before = self._pool.draw(self.iteration)
+        slot, life, before = self._pool.draw(self.iteration)
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
-        scene = self.scene.augmented(slot)
+        scene = self.scene.augmented(life)
         state = self._roll(before, range(self._steps, self._steps + steps), scene)
         self._steps += steps
         viewpoint = scene.viewpoint(self._random)
         pictures, opacity = scene.pictures(state, viewpoint, self.background)
         sums: dict[str, Tensor] = {}
         seen = Iteration(
-            slot=slot,
             before=before,
             after=state,
             frames=steps / config.rule.steps_per_frame,

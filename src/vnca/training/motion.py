@@ -32,12 +32,11 @@ class MotionSupervision(Term):
 
     name = "motion"
 
-    def __init__(self, config: MotionConfig, network: FlowNetwork, scene: SmokeScene) -> None:
-        """Prepare; `network` is frozen, `scene` says how its smoke moves."""
+    def __init__(self, config: MotionConfig, network: FlowNetwork) -> None:
+        """Prepare; `network` is frozen."""
         self.config = config
         self.appearance: deque[float] = deque(maxlen=config.balance_over)
         self._network = network
-        self._scene = scene
 
     def __call__(self, seen: Iteration) -> dict[str, Tensor]:
         """The motion loss; nothing for a state of zeros, which has no texture to move."""
@@ -45,7 +44,7 @@ class MotionSupervision(Term):
             return {}
         appearance = float(seen.sums["appearance"].detach())
         loss = self.loss(
-            seen.slot,
+            seen.scene,
             seen.before,
             seen.pictures,
             seen.viewpoint,
@@ -57,7 +56,7 @@ class MotionSupervision(Term):
 
     def loss(
         self,
-        slot: int,
+        scene: SmokeScene,
         before: Tensor,
         after: Tensor,
         viewpoint: SmokeViewpoint,
@@ -69,7 +68,7 @@ class MotionSupervision(Term):
         """How the texture moved in a rollout, against how the smoke moves in that time, weighted.
 
         Args:
-            slot: That of the state in the pool; in its augmented of the scene the rollout was.
+            scene: That the rollout was in.
             before: The state at its start, `[n + 1, C]`.
             after: The picture of its end, sRGB `[1, 3, r, c]`; differentiable.
             viewpoint: Where the picture was taken from.
@@ -77,7 +76,6 @@ class MotionSupervision(Term):
             frames: Frames that pass in the rollout, n / N.
             appearance: The appearance loss of this iteration.
         """
-        scene = self._scene.augmented(slot)
         with torch.no_grad():
             earlier, _ = scene.pictures(before, viewpoint, background)
         size = min(self.config.size, after.shape[-1])

@@ -97,9 +97,9 @@ class Scene(ABC, Generic[Viewpoint]):
         rows = self._rows.view(-1)[lowest + self._beside]
         return self._decode(state, rows, points - first, self.decoder)
 
-    def augmented(self, slot: int) -> "Scene[Viewpoint]":
-        """The scene that the state at a slot of the pool lives in, always the same cells."""
-        del slot
+    def augmented(self, number: int) -> "Scene[Viewpoint]":
+        """A scene of the same cells that a state of the pool leads its life in, by a number."""
+        del number
         return self
 
     @abstractmethod

@@ -54,7 +54,7 @@ def smoke_trainer(
     )
     rule = replace(rule, place=Region(Lattice(smoke.index_to_world), scene.domain.box))
     if config.motion.weight and scene.moves:
-        terms = (MotionSupervision(config.motion, FlowNetwork.load(device), scene), *terms)
+        terms = (MotionSupervision(config.motion, FlowNetwork.load(device)), *terms)
     return Trainer(scene, rule, style, config, network, terms=terms, memory_budget=memory_budget)
 
 

@@ -20,11 +20,10 @@ class Iteration:
     """What an iteration shows, for the terms of the loss to judge.
 
     Attributes:
-        slot: That of the state in the pool.
         before: The state at the start of the rollout, `[n + 1, C]`.
         after: The state at its end, alike; differentiable.
         frames: Frames that pass in the rollout: its steps over those of a frame.
-        scene: The scene as the slot is augmented.
+        scene: That the rollout was in, as it is augmented.
         viewpoint: Where the pictures were taken from.
         pictures: Of the end of the rollout, sRGB `[b, 3, r, c]` over the background;
             differentiable.
@@ -33,7 +32,6 @@ class Iteration:
         sums: What the terms before this one came to, weighted, by their names.
     """
 
-    slot: int
     before: Tensor
     after: Tensor
     frames: float

@@ -61,7 +61,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
     Attributes:
         view: How it is looked at.
         augment: Whether the velocity and the density that a rule is conditioned on differ from
-            slot to slot of the pool.
+            life to life of the states.
         box: The cells that hold smoke lie in it.
         velocity: `[n, 3]`, cells per frame.
         moves: Whether the smoke has any.
@@ -84,7 +84,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
             rule: Its normalisers, switches and decoder are used, not the weights of its automaton.
             view: How it is looked at; gamma is the rule's.
             augment: Whether the velocity and the density that the rule is conditioned on differ
-                from slot to slot of the pool.
+                from life to life of the states.
             device: Where rollouts and pictures are computed.
             backend: What decodes.
 
@@ -134,19 +134,19 @@ class SmokeScene(Scene[SmokeViewpoint]):
         self.velocity = torch.from_numpy(velocity).to(device)
         self._rule = rule
 
-    def augmented(self, slot: int) -> "SmokeScene":
-        """The smoke as the state at a slot sees it: faster or slower, denser or thinner.
+    def augmented(self, number: int) -> "SmokeScene":
+        """The smoke as a state sees it in its life: faster or slower, denser or thinner.
 
-        At odd slots its velocity is turned at random, too, and one that all cells share is added.
+        At odd numbers its velocity is turned at random, too, and one that all cells share is added.
         The rule is conditioned on that velocity, and motion is judged by it; the density that is
         seen stays as it is.
         """
         if not (self.augment and self.moves):
             return self
-        random = np.random.default_rng(slot)
+        random = np.random.default_rng(number)
         velocity = self.velocity.cpu().numpy() * random.uniform(*SPEEDS)
         denser = DENSEST ** random.uniform(-1, 1)
-        if slot % 2:
+        if number % 2:
             turn, heading = Rotation.from_quat(random.standard_normal((2, 4))).as_matrix()
             strength = random.uniform(0, STRONGEST) * self._rule.scales.velocity
             velocity = velocity @ turn + strength * heading[0]
@@ -324,17 +324,17 @@ def _stood(index_to_world: AnyArray) -> AnyArray | None:
     linear = index_to_world[:3, :3] / np.cbrt(abs(np.linalg.det(index_to_world[:3, :3])))
     if np.allclose(linear, np.eye(3), rtol=0, atol=_UPRIGHT):
         return None
-    slot = np.eye(4)
-    slot[:3, :3] = linear
-    return slot
+    place = np.eye(4)
+    place[:3, :3] = linear
+    return place
 
 
 def _around(
-    lower: AnyArray, upper: AnyArray, slot: AnyArray | None
+    lower: AnyArray, upper: AnyArray, place: AnyArray | None
 ) -> tuple[list[float], list[float]]:
     """The box around cells, where cameras are."""
-    if slot is not None:
-        lower, upper = world_box(lower, upper, slot)
+    if place is not None:
+        lower, upper = world_box(lower, upper, place)
     return lower.tolist(), upper.tolist()
 
 
