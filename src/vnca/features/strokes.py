@@ -6,10 +6,11 @@ ridges cover, weighed by their contrast.
 """
 
 from math import pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 import torch
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter
 from torch.nn import functional
 
 from vnca.core.colour import linear_to_srgb
@@ -28,7 +29,57 @@ _FIRST, _AN_OCTAVE, _SCALES = 0.63, 3, 18  # of the blurs, pixels
 _GAMMA = 0.75  # of the normalisation over scales, for ridges (Lindeberg 1998)
 _WIDTH = pi * sqrt(1 / (2 * _GAMMA))  # of a stripe, in units of the blur it stands out most in
 _BESIDE = 0.6  # pixels between a point of a ridge and its crest, at most
+_AWAY = 3.0  # blurs from the border of what is shown, at least: beyond it is something else
 _FAINTEST = 0.01  # contrast that is structure, of 0 to 1
+
+
+class Ridges(NamedTuple):
+    """Points on the crests of strokes.
+
+    Attributes:
+        area: What each stands for, `[n]`: contrast times width.
+        width: Of the stroke there, pixels, `[n]`.
+    """
+
+    area: AnyArray
+    width: AnyArray
+
+    @property
+    def mean_width(self) -> float:
+        """Pixels: the geometric mean over the area; 0 if there are none."""
+        total = self.area.sum()
+        return 2 ** float((self.area * np.log2(self.width)).sum() / total) if total > 0 else 0.0
+
+
+def find_ridges(values: AnyArray, where: BoolArray | None = None) -> Ridges:
+    """The strokes of a picture.
+
+    Args:
+        values: `[r, c]`.
+        where: Pixels of a picture that is shown in them alone, `[r, c]`; all unless given.
+
+    Reference: Lindeberg 1998, section 5 (edge and ridge detection with automatic scale selection).
+    """
+    inside = None if where is None else distance_inside(where)
+    blurs = _FIRST * 2 ** (np.arange(_SCALES) / _AN_OCTAVE)
+    found = [_ridges(values, blur) for blur in blurs]
+    parts = []
+    for at in range(1, len(blurs) - 1):
+        (below, _), (strength, crest), (above, _) = found[at - 1 : at + 2]
+        here = crest & (strength > _FAINTEST) & (strength >= below) & (strength > above)
+        if inside is not None:
+            here &= inside > _AWAY * blurs[at]
+        below, strength, above = below[here], strength[here], above[here]
+        # Between the blurs, where the parabola through the three is highest.
+        beside = (below - above) / (2 * (below - 2 * strength + above))
+        blur = _FIRST * 2 ** ((at + beside) / _AN_OCTAVE)
+        parts.append((strength * blur, _WIDTH * blur))
+    return Ridges(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+
+def distance_inside(where: BoolArray) -> AnyArray:
+    """How far each pixel is from those that are not chosen, or from the border, `[r, c]`."""
+    return np.asarray(distance_transform_edt(np.pad(where, 1)))[1:-1, 1:-1]
 
 
 def stroke_width(picture: FloatArray) -> float | None:
@@ -38,27 +89,12 @@ def stroke_width(picture: FloatArray) -> float | None:
 
     Args:
         picture: Linear RGB `[r, c, 3]`.
-
-    Reference: Lindeberg 1998, section 5 (edge and ridge detection with automatic scale selection).
     """
     shorter = min(picture.shape[:2])
     if shorter > _SIZE:
         picture, shorter = _reduced(picture, _SIZE / shorter), _SIZE
-    values = _principal(linear_to_srgb(picture.clip(0, 1)))
-    blurs = _FIRST * 2 ** (np.arange(_SCALES) / _AN_OCTAVE)
-    found = [_ridges(values, blur) for blur in blurs]
-    total, logarithms = 0.0, 0.0
-    for at in range(1, len(blurs) - 1):
-        (below, _), (strength, crest), (above, _) = found[at - 1 : at + 2]
-        here = crest & (strength > _FAINTEST) & (strength >= below) & (strength > above)
-        below, strength, above = below[here], strength[here], above[here]
-        # Between the blurs, where the parabola through the three is highest.
-        beside = (below - above) / (2 * (below - 2 * strength + above))
-        octaves = (at + beside) / _AN_OCTAVE
-        area = strength * 2**octaves
-        total += float(area.sum())
-        logarithms += float((area * octaves).sum())
-    return _WIDTH * _FIRST * 2 ** (logarithms / total) / shorter if total > 0 else None
+    width = find_ridges(_principal(linear_to_srgb(picture.clip(0, 1)))).mean_width
+    return width / shorter if width > 0 else None
 
 
 def picture_cells(picture: FloatArray, cells: float, pixels: int) -> float:

@@ -10,6 +10,53 @@ from vnca.metrics.coherence import LONG, Agreement, mean_agreement
 from vnca.metrics.style_score import joined_style_score
 from vnca.metrics.survey import Survey, TextureMotion
 
+_Better = Literal["higher", "lower", "nearer to 0"]
+_NORMALISED = "normalised: 0 plain smoke, 1 the picture's own parts"
+_STRUCTURE: tuple[tuple[str, str, str, str, _Better], ...] = (
+    (
+        "structure.lines",
+        "Lines",
+        "How much more (or less) it is made of lines than the picture is.",
+        "difference of agreement of directions, from -1 to 1",
+        "nearer to 0",
+    ),
+    (
+        "structure.width",
+        "Width of strokes",
+        "How much wider (or narrower) its strokes are than the picture's.",
+        "octaves",
+        "nearer to 0",
+    ),
+    (
+        "structure.contrast",
+        "Bright on dark",
+        "How much more (or less) its marks are bright on dark than the picture's.",
+        "difference of shares, from -2 to 2",
+        "nearer to 0",
+    ),
+    (
+        "structure.direction",
+        "Direction of strokes",
+        "The share of its strokes that run another way than the picture's.",
+        "share",
+        "lower",
+    ),
+    (
+        "structure.regions",
+        "Colours by region",
+        "How much of the way from grey smoke to the picture it goes in large shapes: by the "
+        "colours of regions, an eighth of the picture wide.",
+        _NORMALISED,
+        "higher",
+    ),
+    (
+        "structure.patches",
+        "Patches",
+        "The same by patches of 7×7 pixels, each with the nearest one of the other.",
+        _NORMALISED,
+        "higher",
+    ),
+)
 _PART = {
     True: "which the rule was trained to please: it says less than the others",
     False: "which had no part in training",
@@ -38,7 +85,7 @@ class Measure:
     meaning: str
     value: float | None
     unit: str
-    better: Literal["higher", "lower", "nearer to 0"] | None
+    better: _Better | None
     unstylized: float | None = None
     more: Mapping[str, Any] = field(default_factory=dict)
     reason: str = ""
@@ -57,6 +104,7 @@ def measures(survey: Survey) -> tuple[Measure, ...]:
     """All measures of a survey."""
     return (
         *_style(survey),
+        *_structure(survey),
         *_views(survey),
         *_time(survey),
         *_motion(survey.turn.texture),
@@ -72,7 +120,7 @@ def _style(survey: Survey) -> Iterable[Measure]:
         "How much of the way from grey smoke to the picture the painting goes: 1 is as near as "
         "the picture's own parts are.",
         style.gap_closed,
-        "normalised: 0 plain smoke, 1 the picture's own parts",
+        _NORMALISED,
         "higher",
         unstylized=0.0,
         more={
@@ -89,11 +137,29 @@ def _style(survey: Survey) -> Iterable[Measure]:
             f"Normalised style score, by {judge.name}",
             f"The same in the eyes of the network '{judge.name}', {_PART[judge.trained_with]}.",
             float(np.mean(known)) if known else None,
-            "normalised: 0 plain smoke, 1 the picture's own parts",
+            _NORMALISED,
             "higher",
             unstylized=0.0,
             more={"trained_with": judge.trained_with, "frames": judge.shares},
             reason=judge.reason or "the smoke is opaque in no frame that was looked at",
+        )
+
+
+def _structure(survey: Survey) -> Iterable[Measure]:
+    for name, title, meaning, unit, better in _STRUCTURE:
+        of = name.partition(".")[2]
+        values = {frame: getattr(found, of) for frame, found in survey.structure.items() if found}
+        known = [value for value in values.values() if value is not None]
+        yield Measure(
+            name,
+            title,
+            meaning,
+            float(np.mean(known)) if known else None,
+            unit,
+            better,
+            more={"trained_with": False, "frames": values},
+            reason="in the frames that were looked at, too little that is opaque, or nothing in "
+            "it, is large enough to tell",
         )
 
 

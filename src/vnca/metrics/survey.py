@@ -19,6 +19,7 @@ from vnca.metrics.motion import (
     measure_motion,
 )
 from vnca.metrics.setup import Coloured, Pair, Setup, Viewpoint
+from vnca.metrics.structure import Likeness, StructureMetric
 from vnca.metrics.style import StyleMetric
 from vnca.metrics.style_score import SIDES, Judge, StyleScore, joined_style_score, style_score
 from vnca.painting.roll import Painting
@@ -123,6 +124,7 @@ class Survey:
         frames: Numbers of the frames painted.
         style: The style_score of four sides of some frames, by frame; at least of one.
         judges: What networks say of the same.
+        structure: How the structure of the same differs, by frame; perhaps of none.
         turn: The middle frame.
         steps: How each frame agrees with those before.
         density: How each frame's density changes.
@@ -132,6 +134,7 @@ class Survey:
     frames: tuple[int, ...]
     style: dict[int, StyleScore]
     judges: tuple[Judge, ...]
+    structure: dict[int, Likeness | None]
     turn: Turn
     steps: tuple[Step, ...]
     density: tuple[DensityChange, ...]
@@ -162,7 +165,8 @@ def survey(
     """
     seen_by = estimators()
     coherence = Coherence(seen_by["dis"])
-    frames, density, strip, style, turn = [], [], [], {}, None
+    by_structure = StructureMetric(metric.picture)
+    frames, density, strip, style, structure, turn = [], [], [], {}, {}, None
     kept, compared = _spread(count, STRIP_FRAMES), _spread(count, STYLE_FRAMES)
     for at, painting in enumerate(paintings):
         smoke = painting.smoke
@@ -177,6 +181,7 @@ def survey(
             pairs = [setup.look_twice(painted, plain, viewpoint) for viewpoint in SIDES]
             if (found := style_score(metric, pairs)) is not None:
                 style[smoke.frame] = found
+                structure[smoke.frame] = by_structure.likeness(pairs, metric)
                 for judge in judges:
                     judge.look(smoke.frame, pairs, metric)
         if at == count // 2:
@@ -195,6 +200,7 @@ def survey(
         tuple(frames),
         style or {turn.frame: turn.style_score},
         tuple(judges),
+        structure,
         turn,
         coherence.steps,
         tuple(density),
