@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from vnca.bench.measurement import Spread, in_turns
-from vnca.core.typing import AnyArray, Box
-from vnca.engine.decode_backend import array_decode, torch_decode
-from vnca.engine.decode_weights import Weights
+from vnca.bench import Spread, in_turns
+from vnca.core import AnyArray, Box
+from vnca.engine import array_decode, torch_decode
+from vnca.engine.automaton import DecoderWeights
 from vnca.engine.domain import Domain
-from vnca.rule.decoder import Decoder
+from vnca.rule import Decoder
 
 FACTOR = 4
 """Parts along a cell, for `cells`."""
@@ -65,7 +65,7 @@ def main() -> None:
 
     def on_tensors(backend: str) -> Callable[[], torch.Tensor]:
         decode = torch_decode(backend, device=device, threads=options.threads)
-        return lambda: decode(trained[0], *to[1:], Weights(*trained[1:]))
+        return lambda: decode(trained[0], *to[1:], DecoderWeights(*trained[1:]))
 
     def both(seen: Callable[[], torch.Tensor]) -> Any:
         return lambda: torch.autograd.grad(seen(), trained, gradient)

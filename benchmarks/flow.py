@@ -13,6 +13,7 @@ translations best.
 """
 
 import argparse
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -29,23 +30,24 @@ from torch.nn import functional
 
 import vnca
 from msoe import published
-from vnca.bench.measurement import append_csv, run_facts, write_json
+from vnca.bench import append_csv, run_facts, write_json
 from vnca.core.camera import frame_box
 from vnca.core.errors import VncaError
 from vnca.features.flow import FlowNetwork
+from vnca.io import SmokeFormat, read_smoke
 from vnca.io.picture import read_image
-from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.metrics.motion import Estimator, dis, estimator_of, farneback
+from vnca.rendering import projected_velocity, render
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
-from vnca.rendering.sample import sample
-from vnca.rendering.velocity import projected_velocity
-from vnca.rendering.view import render
-from vnca.training.flow.displacement import random_displacement
-from vnca.training.flow.pairs import moving_texture, random_silhouette
-from vnca.training.flow.textures import KINDS, Kind, bank, cut, log_uniform, uniform
+from vnca.rendering.march import sample
+from vnca.training.config import SmokeConfig
 from vnca.training.scenes.smoke import smoke_bounds
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.smoke_trainer import choose_scales
+from vnca.training.trainers import choose_scales
+
+sys.path.append(str(Path(__file__).parents[1] / "tools" / "flow"))
+from displacement import random_displacement
+from pairs import moving_texture, random_silhouette
+from textures import KINDS, Kind, bank, cut, log_uniform, uniform
 
 PICTURES = ("full", "masked", "smoke")
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)

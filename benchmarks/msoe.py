@@ -15,9 +15,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from vnca.core import FloatArray
 from vnca.core.errors import FileFormatError
 from vnca.core.files import existing_file
-from vnca.core.typing import FloatArray
 from vnca.metrics.motion import Estimator
 
 SCALES = 5

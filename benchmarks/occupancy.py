@@ -7,10 +7,10 @@ import argparse
 import os
 from pathlib import Path
 
-from vnca.bench.cases import Case
-from vnca.bench.measurement import append_csv
+from vnca.bench import append_csv
+from vnca.bench.contenders import Case
 from vnca.bench.step import StepConfig, measure, prepare, take_part
-from vnca.core.typing import Index
+from vnca.core import Index
 
 SHARES = (0.01, 0.02, 0.05, 0.1, 0.15, 0.25, 0.5, 0.75, 1.0)
 

@@ -13,8 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from chart import COLOURS, Chart, around, page
-from vnca.bench.cases import PROBABILITY
-from vnca.bench.contenders import DTYPES
+from vnca.bench.contenders import DTYPES, PROBABILITY
 from vnca.bench.step import needed_bytes, needed_flop
 
 ROOT = Path(__file__).parents[1]

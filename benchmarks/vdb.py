@@ -11,8 +11,8 @@ import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
-from vnca.bench.cases import smoke
-from vnca.core.typing import Box
+from vnca.bench.contenders import smoke
+from vnca.core import Box
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 
 

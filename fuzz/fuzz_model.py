@@ -18,9 +18,8 @@ from harness import fuzz, lengthened, shortened
 
 with atheris.instrument_imports(include=["vnca", "json"]):
     from vnca.io.smoke_format import SmokeFormat
-    from vnca.rule.decoder import Decoder
+    from vnca.rule import Decoder, Rule, RuleConfig, Scales
     from vnca.rule.model import Model, from_record
-    from vnca.rule.rule import Rule, RuleConfig, Scales
 
 _FILE, _HEADER, _METADATA = range(3)
 _BETWEEN = b"\n\n"

@@ -18,9 +18,8 @@ import numpy as np
 from harness import fuzz, lengthened, shortened
 
 with atheris.instrument_imports(include=["vnca"]):
-    from vnca.core.typing import Box
-    from vnca.io import vdb_smoke
-    from vnca.io.smoke import SmokeFormat, read_smoke
+    from vnca.core import Box
+    from vnca.io import SmokeFormat, read_smoke, vdb_smoke
     from vnca.io.vdb import VALUE_TYPES, Grid, Tiles, Transform, open_vdb, write_vdb
     from vnca.io.vdb.layout import Cursor, encode_string
     from vnca.io.vdb.metadata import Metadata, read_metadata

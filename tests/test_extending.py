@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import vnca
+from vnca import engine as sessions
 from vnca.core.volume import Volume
-from vnca.engine import session as sessions
 from vnca.engine.domain import Domain
 from vnca.io import smoke_format
 from vnca.rule import conditioning

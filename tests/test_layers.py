@@ -25,8 +25,7 @@ BACKENDS_WITH_TORCH = (
     "tensors.py",
     "reference/",
     "triton/",
-    "native/step_autograd",
-    "native/decode_autograd",
+    "native/autograd.py",
 )
 SOURCES = sorted(p for p in ROOT.rglob("*.py") if p != ROOT / "__init__.py")
 

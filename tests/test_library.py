@@ -36,9 +36,9 @@ def test_every_name_is_there_and_listed(name: str) -> None:
 
 def test_a_name_is_the_thing_itself() -> None:
     from vnca.core.volume import Volume
-    from vnca.painting.roll import stylize
+    from vnca.painting import stylize
     from vnca.recipe import stylizing
-    from vnca.rendering.view import render
+    from vnca.rendering import render
 
     assert vnca.Volume is Volume
     assert vnca.stylize is stylizing.stylize

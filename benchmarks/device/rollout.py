@@ -17,11 +17,10 @@ import torch
 from torch import Tensor
 
 import vnca
-from vnca.bench.cases import PROBABILITY, Case, Place
-from vnca.bench.contenders import DTYPES
-from vnca.core.typing import Index
+from vnca.bench.contenders import DTYPES, PROBABILITY, Case, Place
+from vnca.core import Index
+from vnca.engine import Compute, open_session
 from vnca.engine.automaton import Automaton, Weights, stencil
-from vnca.engine.session import Compute, open_session
 
 COLUMNS = ("date", "device", "torch", "vnca", "what", "dtype", "grid", "occupancy", "ms", "peak_mb")
 

@@ -24,7 +24,7 @@ import torch
 import triton
 
 from vnca.engine import native
-from vnca.engine.session import choose
+from vnca.engine import choose
 
 print(f"python {sys.version.split()[0]}, numpy {numpy.__version__}, triton {triton.__version__}")
 print(f"torch {torch.__version__}, CUDA {torch.version.cuda}, {torch.cuda.get_device_name()}")

@@ -8,9 +8,9 @@ import argparse
 import json
 from pathlib import Path
 
-from vnca.bench.measurement import append_csv
+from vnca.bench import append_csv
 from vnca.bench.step import StepConfig, measure_steps, prepare
-from vnca.core.typing import Index
+from vnca.core import Index
 
 SMALL, LARGE = (64, 64, 64), (200, 300, 200)
 OCCUPANCIES = (0.01, 0.05, 0.15, 0.5)

@@ -12,9 +12,8 @@ from typing import Any
 import torch
 from triton.runtime.errors import OutOfResources
 
-from vnca.bench.cases import Case, Place
-from vnca.bench.contenders import DTYPES, contender
-from vnca.bench.measurement import Begin, seconds
+from vnca.bench import Begin, seconds
+from vnca.bench.contenders import DTYPES, Case, Place, contender
 from vnca.engine.triton import step as triton
 
 CHOICES: dict[str, tuple[Any, ...]] = {

@@ -18,10 +18,10 @@ from judge import AROUND, Judge, paint
 from study import REFERENCE, Findings, Study, run
 from torch import Tensor
 
-from vnca.painting.roll import Painting
+from vnca.painting import Painting
+from vnca.rendering import Mode
 from vnca.rendering.colour import luminance
-from vnca.rendering.view import Mode
-from vnca.rule.rule import Rule
+from vnca.rule import Rule
 
 
 @dataclass(frozen=True)

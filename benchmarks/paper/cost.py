@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from judge import AROUND, PAINTED, Judge, magnified
 from study import REFERENCE, Findings, Study, run
 
-from vnca.bench.measurement import peak_mb
+from vnca.bench import peak_mb
 from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
-from vnca.painting.roll import Roll
-from vnca.rule.rule import Rule
+from vnca.painting import Roll
+from vnca.rule import Rule
 from vnca.training.scenes.smoke import smoke_bounds
 
 PAPERS_GRID = 3.125

@@ -13,7 +13,7 @@ from judge import UNPAINTED, Judge, paint
 from study import REFERENCE, Findings, Study, run
 
 from vnca.engine.domain import DomainKind
-from vnca.training.smoke_config import SmokeConfig
+from vnca.training.config import SmokeConfig
 
 DOMAINS = {"active": "smoke", "box": "its box"}
 

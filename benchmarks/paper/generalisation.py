@@ -17,10 +17,10 @@ import numpy as np
 from judge import PAINTED, UNPAINTED, Judge, magnified, paint
 from study import REFERENCE, Findings, Lines, Study, run
 
-from vnca.painting.roll import Painting, stylize
+from vnca.painting import Painting, stylize
 from vnca.recipe import simulation
 from vnca.recipe.sequence import open_sequence, sequence_region, volumes
-from vnca.rule.rule import Rule
+from vnca.rule import Rule
 from vnca.simulation import simulate
 
 RESOLUTION = 48

@@ -7,18 +7,17 @@ import torch
 from scipy.ndimage import zoom
 from study import Study
 
+from vnca.core import FloatArray
 from vnca.core.camera import frame_box
-from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
-from vnca.features.load import load_network
+from vnca.features import load_network
 from vnca.io.film import contact_sheet
 from vnca.io.picture import fit, read_image
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
-from vnca.painting.config import StylizeConfig
-from vnca.painting.roll import Painting, Roll
+from vnca.painting import Painting, Roll, StylizeConfig
+from vnca.rendering import Mode, View, render
 from vnca.rendering.colour import linear_to_srgb
-from vnca.rendering.view import Mode, View, render
-from vnca.rule.rule import Rule
+from vnca.rule import Rule
 from vnca.training.scenes.smoke import PREVIEW_BACKGROUND, PREVIEW_STEP, PREVIEW_VIEWS, smoke_bounds
 
 Viewpoint = tuple[float, float]

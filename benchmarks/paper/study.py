@@ -13,24 +13,23 @@ import numpy as np
 import torch
 import tyro
 
-from vnca.bench.measurement import append_csv, run_facts
+from vnca.bench import append_csv, run_facts
+from vnca.core import FloatArray
 from vnca.core.errors import OptionError, VncaError
 from vnca.core.files import existing_file, writable_folder
-from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
-from vnca.core.watch import Silent
+from vnca.io import SmokeFormat, read_smoke
 from vnca.io.picture import write_image
-from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.losses.appearance import AppearanceConfig
+from vnca.recipe import Silent
 from vnca.recipe.session import choose_device
 from vnca.recipe.smoke import SmokeRun
 from vnca.recipe.smoke import run as train
+from vnca.rule import Rule, RuleConfig
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule, RuleConfig
 from vnca.training.checkpoint import CHECKPOINT_NAME
-from vnca.training.config import PoolConfig
+from vnca.training.config import PoolConfig, SmokeConfig, ViewConfig
 from vnca.training.presets import preset
-from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 ROOT = Path(__file__).parents[2]
 REFERENCE = "reference"

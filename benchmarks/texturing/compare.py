@@ -22,20 +22,19 @@ from typing import Any
 import torch
 from solid import optimised_blocks
 
-from vnca.bench.measurement import append_csv, run_facts, write_json
-from vnca.core.typing import FloatArray
-from vnca.engine.session import Compute
-from vnca.features.load import load_network
-from vnca.features.network import FeatureNetwork
+from vnca.bench import append_csv, run_facts, write_json
+from vnca.core import FloatArray
+from vnca.engine import Compute
+from vnca.features import FeatureNetwork, load_network
 from vnca.io.picture import read_image
 from vnca.losses.appearance import AppearanceLoss
 from vnca.metrics.style_score import slice_distances
 from vnca.painting.block import border_jump, grow
+from vnca.rule import Rule
 from vnca.rule.model import Model
-from vnca.rule.rule import Rule
+from vnca.training.config import TextureConfig
 from vnca.training.presets import preset, preset_names
-from vnca.training.texture_config import TextureConfig
-from vnca.training.texture_trainer import texture_trainer
+from vnca.training.trainers import texture_trainer
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,17 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
+from vnca.core import FloatArray
 from vnca.core.colour import linear_to_srgb
-from vnca.core.typing import FloatArray
 from vnca.losses.appearance import AppearanceLoss
 from vnca.rendering.colour import srgb_to_linear
-from vnca.training.scenes.slices import as_picture, axis_angles, oblique_angles, shown, slice_points
+from vnca.training.scenes.texture import (
+    as_picture,
+    axis_angles,
+    oblique_angles,
+    shown,
+    slice_points,
+)
 
 LEARNING_RATE = 0.02
 SLICES = 3

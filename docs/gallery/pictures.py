@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from vnca.core import AnyArray
 from vnca.core.colour import srgb_to_linear
-from vnca.core.typing import AnyArray
 from vnca.io.picture import write_image
 
 SIZE = 512

@@ -13,7 +13,7 @@ from pathlib import Path
 import knot
 from workshop import HERE, drawn, made, texture_of
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.io.film import contact_sheet
 from vnca.io.mesh import read_mesh
 from vnca.io.picture import fit, read_image, write_image

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vnca.core.watch import SILENT
 from vnca.io.picture import write_image
+from vnca.recipe import SILENT
 from vnca.recipe.film import FilmConfig
 from vnca.recipe.rendering import RenderRun, strip
 from vnca.recipe.sequence import open_sequence

@@ -10,42 +10,39 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from vnca.core import Box
     from vnca.core.camera import Orthographic, Perspective, frame_box
     from vnca.core.errors import Cancelled, VncaError
     from vnca.core.lattice import Lattice
-    from vnca.core.typing import Box
     from vnca.core.volume import Volume
-    from vnca.core.watch import Watch
-    from vnca.features.load import load_network
+    from vnca.features import load_network
+    from vnca.io import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
     from vnca.io.film import FilmWriter
     from vnca.io.picture import read_image, write_image
     from vnca.io.sequence import find_frames
-    from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
     from vnca.io.vdb import open_vdb, write_vdb
-    from vnca.painting.config import StylizeConfig
-    from vnca.painting.roll import Painting
-    from vnca.painting.roll import stylize as stylize_frames
+    from vnca.painting import Painting, StylizeConfig
+    from vnca.painting import stylize as stylize_frames
+    from vnca.recipe import Watch, load
     from vnca.recipe.evaluation import Evaluation, evaluate
     from vnca.recipe.film import FilmConfig
     from vnca.recipe.paint import paint
-    from vnca.recipe.recorded import load
     from vnca.recipe.rendering import render
     from vnca.recipe.simulation import simulate
     from vnca.recipe.smoke import train
     from vnca.recipe.stylizing import PaintedFrame, stylize
     from vnca.recipe.texture import texture
-    from vnca.rendering.view import View
-    from vnca.rendering.view import render as render_view
+    from vnca.rendering import View
+    from vnca.rendering import render as render_view
+    from vnca.rule import Rule, RuleConfig, Scales
     from vnca.rule.conditioning import Conditioning, register_conditioning
     from vnca.rule.model import Model
-    from vnca.rule.rule import Rule, RuleConfig, Scales
     from vnca.simulation import simulate as simulate_smoke
+    from vnca.training.config import SmokeConfig, TextureConfig
     from vnca.training.loop import Trainer
     from vnca.training.presets import preset
-    from vnca.training.smoke_config import SmokeConfig
-    from vnca.training.smoke_trainer import smoke_trainer
     from vnca.training.terms import Iteration, Term
-    from vnca.training.texture_config import TextureConfig
+    from vnca.training.trainers import smoke_trainer
 
 # Functions that share the name of a subpackage have one of their own here: an imported
 # subpackage takes its name in this one.
@@ -56,50 +53,50 @@ _HOMES = {
     "stylize": "recipe.stylizing",
     "simulate": "recipe.simulation",
     "render": "recipe.rendering",
-    "load": "recipe.recorded",
+    "load": "recipe",
     "evaluate": "recipe.evaluation",
-    "TextureConfig": "training.texture_config",
+    "TextureConfig": "training.config",
     "Iteration": "training.terms",
     "Term": "training.terms",
     "PaintedFrame": "recipe.stylizing",
     "Evaluation": "recipe.evaluation",
     "FilmConfig": "recipe.film",
-    "Watch": "core.watch",
+    "Watch": "recipe",
     "Cancelled": "core.errors",
-    "Box": "core.typing",
+    "Box": "core",
     "Conditioning": "rule.conditioning",
     "register_conditioning": "rule.conditioning",
     "FilmWriter": "io.film",
     "Lattice": "core.lattice",
     "Model": "rule.model",
     "Orthographic": "core.camera",
-    "Painting": "painting.roll",
+    "Painting": "painting",
     "Perspective": "core.camera",
-    "Rule": "rule.rule",
-    "RuleConfig": "rule.rule",
-    "Scales": "rule.rule",
-    "SmokeFormat": "io.smoke",
-    "StylizeConfig": "painting.config",
-    "SmokeConfig": "training.smoke_config",
+    "Rule": "rule",
+    "RuleConfig": "rule",
+    "Scales": "rule",
+    "SmokeFormat": "io",
+    "StylizeConfig": "painting",
+    "SmokeConfig": "training.config",
     "Trainer": "training.loop",
-    "View": "rendering.view",
+    "View": "rendering",
     "VncaError": "core.errors",
     "Volume": "core.volume",
     "find_frames": "io.sequence",
     "frame_box": "core.camera",
-    "load_network": "features.load",
+    "load_network": "features",
     "open_vdb": "io.vdb",
     "preset": "training.presets",
     "read_image": "io.picture",
-    "read_smoke": "io.smoke",
-    "render_view": "rendering.view:render",
+    "read_smoke": "io",
+    "render_view": "rendering:render",
     "simulate_smoke": "simulation:simulate",
-    "smoke_box": "io.smoke",
-    "smoke_trainer": "training.smoke_trainer",
-    "stylize_frames": "painting.roll:stylize",
+    "smoke_box": "io",
+    "smoke_trainer": "training.trainers",
+    "stylize_frames": "painting:stylize",
     "write_image": "io.picture",
-    "write_painted": "io.smoke",
-    "write_smoke": "io.smoke",
+    "write_painted": "io",
+    "write_smoke": "io",
     "write_vdb": "io.vdb",
 }
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import pytest
 import torch
 
-from vnca.bench.cases import Case
+from vnca.bench.contenders import Case
 from vnca.bench.step import StepConfig
 
 Make = Callable[..., StepConfig]

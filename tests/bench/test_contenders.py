@@ -2,12 +2,11 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.bench.cases import Case, Place
-from vnca.bench.contenders import PlainUpdate
-from vnca.core.typing import Box
+from vnca.bench.contenders import Case, Place, PlainUpdate
+from vnca.core import Box
 from vnca.engine.automaton import stencil
 from vnca.engine.domain import Domain
-from vnca.engine.reference import step as reference
+from vnca.engine.reference import equations as reference
 
 DOUBLE = Place("cpu", torch.float64)
 

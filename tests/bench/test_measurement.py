@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vnca.bench.measurement import Spread, append_csv, in_turns, peak_mb, seconds, write_json
+from vnca.bench import Spread, append_csv, in_turns, peak_mb, seconds, write_json
 from vnca.core.errors import FileFormatError
 
 FACTS = {"device": "abacus, wooden"}

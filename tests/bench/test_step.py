@@ -15,9 +15,9 @@ from vnca.bench.step import (
     prepare,
 )
 from vnca.core.errors import BackendUnavailableError, DisagreementError, OptionError, VncaError
+from vnca.engine import native
 from vnca.engine.native import BACKEND
-from vnca.engine.native import step as native
-from vnca.engine.reference import step as reference
+from vnca.engine.reference import equations as reference
 from vnca.engine.triton import step as triton
 
 Make = Callable[..., StepConfig]

@@ -7,13 +7,13 @@ import pytest
 
 from vnca.bench import stylize
 from vnca.bench.stylize import PaintedSequence, available, measure_stylizing, random_rule
+from vnca.core import FloatArray
 from vnca.core.errors import DisagreementError
-from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
+from vnca.engine import native
 from vnca.engine import native as native_backend
-from vnca.engine.native import step as native
+from vnca.io import SmokeFormat, write_smoke
 from vnca.io.sequence import find_frames
-from vnca.io.smoke import SmokeFormat, write_smoke
 
 
 @pytest.fixture

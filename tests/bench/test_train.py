@@ -10,12 +10,12 @@ from vnca.bench import train
 from vnca.bench.train import Training, measure_training
 from vnca.core.errors import DisagreementError
 from vnca.core.volume import Volume
-from vnca.engine.reference import step as reference
+from vnca.engine.reference import equations as reference
 from vnca.features.vgg import VGG16
 from vnca.io.picture import read_image, resize
 from vnca.losses.appearance import AppearanceConfig
+from vnca.training.config import SmokeConfig, ViewConfig
 from vnca.training.presets import preset
-from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 
 @pytest.fixture

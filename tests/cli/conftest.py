@@ -13,10 +13,10 @@ from PIL import Image
 
 from vnca.cli import main
 from vnca.core.volume import Volume
-from vnca.io.smoke import write_smoke
+from vnca.io import write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
+from vnca.rule import Rule, RuleConfig, Scales
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule, RuleConfig, Scales
 
 TINY = (
     *("--iterations", "2", "--hidden", "8", "--channels", "6", "--view.size", "32"),

@@ -17,7 +17,7 @@ from safetensors.numpy import load_file, save_file
 from vnca.core.volume import Volume
 from vnca.features.efficientnet import EfficientNet
 from vnca.features.vgg import VGG16
-from vnca.io.smoke import write_smoke
+from vnca.io import write_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 from vnca.rule.model import FORMAT_VERSION, MODEL_NAME
 from vnca.training.loop import Trainer
@@ -48,7 +48,7 @@ def no_long_work(monkeypatch: pytest.MonkeyPatch) -> None:
     for network in (EfficientNet, VGG16):
         monkeypatch.setattr(network, "load", begin)
     monkeypatch.setattr(Trainer, "improve", begin)
-    monkeypatch.setattr("vnca.painting.roll.Roll.paint", begin)
+    monkeypatch.setattr("vnca.painting.Roll.paint", begin)
     monkeypatch.setattr("vnca.recipe.rendering.read_colour", begin)
 
 

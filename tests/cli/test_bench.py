@@ -11,9 +11,9 @@ import torch
 from torch import Tensor
 
 from vnca.bench import contenders
+from vnca.engine import native
 from vnca.engine.native import BACKEND
-from vnca.engine.native import step as native
-from vnca.engine.reference import step as reference
+from vnca.engine.reference import equations as reference
 from vnca.engine.triton import step as triton
 
 Vnca = Callable[..., Any]

@@ -12,8 +12,8 @@ from vnca.core.volume import Volume
 from vnca.losses.appearance import AppearanceConfig
 from vnca.recipe.simulation import Scene, simulate
 from vnca.recipe.stylizing import PaintedFrame, stylize
-from vnca.rule.rule import RuleConfig
-from vnca.training.smoke_config import SmokeConfig, ViewConfig
+from vnca.rule import RuleConfig
+from vnca.training.config import SmokeConfig, ViewConfig
 
 Vnca = Callable[..., Any]
 

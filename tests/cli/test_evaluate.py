@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from vnca.core.errors import BackendUnavailableError
-from vnca.features.load import load_network
-from vnca.features.network import FeatureNetwork
+from vnca.features import FeatureNetwork, load_network
 from vnca.rule.model import MODEL_NAME
 
 Vnca = Callable[..., Any]
@@ -28,7 +27,7 @@ NAMES = {
 
 @pytest.fixture(autouse=True)
 def small_pictures_of_motion(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vnca.metrics.survey.MOTION_SIZE", 40)
+    monkeypatch.setattr("vnca.metrics.MOTION_SIZE", 40)
 
 
 class Page(HTMLParser):

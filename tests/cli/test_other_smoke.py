@@ -11,14 +11,14 @@ import pytest
 
 from vnca.core.errors import OptionError, SequenceError
 from vnca.core.volume import Volume
-from vnca.core.watch import Silent
-from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
+from vnca.io import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
-from vnca.painting.roll import Painting
+from vnca.painting import Painting
+from vnca.recipe import Silent
 from vnca.recipe.evaluation import evaluate
 from vnca.recipe.stylizing import stylize
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.training.smoke_config import SmokeConfig
+from vnca.training.config import SmokeConfig
 
 Vnca = Callable[..., Any]
 QUICK = ("--warmup", 2, "--steps-per-frame", 1)

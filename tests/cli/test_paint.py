@@ -10,10 +10,10 @@ import pytest
 
 import vnca as library
 from vnca.core.volume import Volume
-from vnca.core.watch import Silent
-from vnca.io.smoke import read_smoke, write_smoke
+from vnca.io import read_smoke, write_smoke
 from vnca.io.vdb import open_vdb
-from vnca.painting.roll import Painting, Roll, RollState
+from vnca.painting import Painting, Roll, RollState
+from vnca.recipe import Silent
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.loop import Progress, Trainer
 

@@ -12,22 +12,21 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from vnca.core import AnyArray, Index
 from vnca.core.lattice import Lattice
-from vnca.core.typing import AnyArray, Index
 from vnca.core.volume import Volume
-from vnca.core.watch import SILENT, Silent
 from vnca.features.vgg import VGG16
+from vnca.io import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
 from vnca.io.picture import fit, read_image
-from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 from vnca.losses.appearance import AppearanceConfig
-from vnca.painting.config import StylizeConfig
-from vnca.painting.roll import stylize
+from vnca.painting import StylizeConfig, stylize
+from vnca.recipe import SILENT, Silent
 from vnca.recipe.sequence import read_alone
+from vnca.rule import Rule, RuleConfig, Scales
 from vnca.rule.model import Model
-from vnca.rule.rule import Rule, RuleConfig, Scales
-from vnca.training.smoke_config import SmokeConfig, ViewConfig
-from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.config import SmokeConfig, ViewConfig
+from vnca.training.trainers import smoke_trainer
 
 Vnca = Callable[..., Any]
 DATA = Path(__file__).parents[1] / "data"

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from vnca.io.smoke import SmokeFormat, read_smoke
+from vnca.io import SmokeFormat, read_smoke
 from vnca.simulation import simulate
 
 Vnca = Callable[..., Any]

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from vnca.cli import main
-from vnca.cli.stylize import Stylize
+from vnca.cli.paint import Stylize
+from vnca.core import AnyArray
 from vnca.core.errors import OptionError
-from vnca.core.typing import AnyArray
 from vnca.core.volume import Volume
-from vnca.engine.native import step as native
-from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
+from vnca.engine import native
+from vnca.io import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
-from vnca.painting.roll import Roll, RollState
+from vnca.painting import Roll, RollState
+from vnca.rule import Rule, RuleConfig, Scales
 from vnca.rule.model import Model
-from vnca.rule.rule import Rule, RuleConfig, Scales
 
 Vnca = Callable[..., Any]
 Paint = Callable[..., Path]

@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 
 from vnca.core.volume import Volume
-from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
+from vnca.io import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
-from vnca.painting.roll import Painting, Roll, RollState
+from vnca.painting import Painting, Roll, RollState
 
 Vnca = Callable[..., Any]
 Paint = Callable[..., Any]

@@ -13,13 +13,13 @@ import pytest
 from PIL import Image
 
 from vnca.core.volume import Volume
-from vnca.engine.native import step as native
+from vnca.engine import native
+from vnca.io import SmokeFormat, read_smoke, write_smoke
 from vnca.io.sequence import find_frames
-from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
-from vnca.painting.roll import Painting, Roll, RollState
+from vnca.painting import Painting, Roll, RollState
 from vnca.painting.unfinished import Unfinished
+from vnca.rule import Rule
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule
 
 Vnca = Callable[..., Any]
 QUICK = ("--warmup", 4, "--steps-per-frame", 2)

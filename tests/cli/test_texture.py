@@ -9,13 +9,13 @@ import pytest
 import trimesh
 from PIL import Image
 
-from vnca.core.typing import Box
+from vnca.core import Box
 from vnca.io.mesh.glb import Glb
 from vnca.io.vdb import open_vdb
+from vnca.rule import DENSITY_CHANGE, RuleConfig
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import DENSITY_CHANGE, RuleConfig
-from vnca.training.texture_config import TextureConfig
-from vnca.training.texture_trainer import initial_rule
+from vnca.training.config import TextureConfig
+from vnca.training.trainers import initial_rule
 
 Vnca = Callable[..., Any]
 

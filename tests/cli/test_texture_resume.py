@@ -25,7 +25,7 @@ TINY = (
 @pytest.fixture(autouse=True)
 def small_previews(monkeypatch: pytest.MonkeyPatch) -> None:
     """They take most of the time, and nothing here is about how they look."""
-    monkeypatch.setattr("vnca.training.preview.SIZE", 32)
+    monkeypatch.setattr("vnca.training.run.PREVIEW_SIZE", 32)
 
 
 @pytest.fixture

@@ -15,9 +15,9 @@ from PIL import Image
 
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
+from vnca.training.config import SmokeConfig
 from vnca.training.loop import Progress, Trainer
 from vnca.training.presets import preset
-from vnca.training.smoke_config import SmokeConfig
 
 Vnca = Callable[..., Any]
 Run = Callable[..., Path]

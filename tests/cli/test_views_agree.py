@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from vnca.core import AnyArray, Index
 from vnca.core.colour import srgb_to_linear
-from vnca.core.typing import AnyArray, Index
 from vnca.core.volume import Volume
+from vnca.io import write_smoke
 from vnca.io.provenance import read_provenance
-from vnca.io.smoke import write_smoke
 from vnca.io.vdb import Grid, Transform, write_vdb
 
 Vnca = Callable[..., Any]

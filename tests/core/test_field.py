@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
+from vnca.core import AnyArray, Box, Index
 from vnca.core.bricks import Places, bricks_beside, cells_at, sorted_bricks
 from vnca.core.errors import GridError
 from vnca.core.field import Field, dilated, refined
-from vnca.core.typing import AnyArray, Box, Index
 
 seeds = st.integers(0, 2**32 - 1)
 shapes = st.tuples(*[st.integers(1, 19)] * 3)

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vnca.core import AnyArray, Box, Index
 from vnca.core.errors import GridError
 from vnca.core.field import Field
 from vnca.core.lattice import (
@@ -16,7 +17,6 @@ from vnca.core.lattice import (
     require_right_angles,
     upright_turn,
 )
-from vnca.core.typing import AnyArray, Box, Index
 
 TURNS = [
     np.diag(signs)[list(order)]

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from vnca.core import AnyArray
 from vnca.core.errors import ShapeError
-from vnca.core.typing import AnyArray
 from vnca.core.volume import Volume
 
 SHAPE = (5, 3, 4)

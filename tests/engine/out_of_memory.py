@@ -4,8 +4,8 @@ import resource
 
 import numpy as np
 
+from vnca.engine import native
 from vnca.engine.automaton import stencil
-from vnca.engine.native import step as native
 
 CELLS, CHANNELS, HIDDEN, THREADS = 60_000, 12, 16, 4
 

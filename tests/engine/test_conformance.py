@@ -10,14 +10,13 @@ import pytest
 import torch
 from torch import Tensor
 
+from vnca.core import AnyArray, FloatArray, IntArray
 from vnca.core.errors import ShapeError
-from vnca.core.typing import AnyArray, FloatArray, IntArray
+from vnca.engine import PRECISIONS, native
 from vnca.engine.automaton import Weights, changing_rows, stencil
 from vnca.engine.domain import Border, Domain
-from vnca.engine.native import step as native
-from vnca.engine.native.step_autograd import update as native_update
-from vnca.engine.reference import step as reference
-from vnca.engine.session import PRECISIONS
+from vnca.engine.native.autograd import update as native_update
+from vnca.engine.reference import equations as reference
 from vnca.engine.triton import step as triton_backend
 
 KERNELS: dict[str, dict[str, Any]] = {

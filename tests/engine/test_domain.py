@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
+from vnca.core import AnyArray, BoolArray, Box, Index, IntArray
 from vnca.core.errors import OptionError
 from vnca.core.field import Field
-from vnca.core.typing import AnyArray, BoolArray, Box, Index, IntArray
 from vnca.engine.automaton import OFFSETS
 from vnca.engine.domain import Domain
 

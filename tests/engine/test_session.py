@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 import torch
 
+from vnca import engine as sessions
 from vnca.core.errors import BackendUnavailableError, OptionError
-from vnca.engine import reference
-from vnca.engine import session as sessions
+from vnca.engine import BACKENDS, Compute, backend_named, choose, native, open_session, reference
 from vnca.engine import triton as triton_backend
 from vnca.engine.automaton import Automaton, Weights, changing_rows, stencil
 from vnca.engine.domain import Domain
-from vnca.engine.native import step as native
-from vnca.engine.session import BACKENDS, Compute, backend_named, choose, open_session
 from vnca.engine.triton import step as triton
 
 needs_native = pytest.mark.skipif(native.unavailable() is not None, reason="not built")

@@ -8,10 +8,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from vnca.core.typing import AnyArray, Box
+from vnca.core import AnyArray, Box
 from vnca.engine.automaton import OFFSETS, Weights, changing_rows, hash_cells, stencil
 from vnca.engine.domain import Domain
-from vnca.engine.reference.step import update
+from vnca.engine.reference.equations import update
 
 CHANNELS, HIDDEN, PRIORS = 4, 6, 3
 

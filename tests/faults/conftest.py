@@ -16,9 +16,9 @@ import pytest
 from PIL import Image
 
 from vnca.core.volume import Volume
-from vnca.io.smoke import write_smoke
+from vnca.io import write_smoke
+from vnca.rule import Rule, RuleConfig, Scales
 from vnca.rule.model import Model
-from vnca.rule.rule import Rule, RuleConfig, Scales
 
 MOMENTS = ("torn", "written", "renamed", "seconds")
 

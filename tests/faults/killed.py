@@ -19,9 +19,11 @@ import stat
 import sys
 import threading
 import time
-from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
+
+from vnca.cli import HOMES, main
+from vnca.cli.options import command_at
 
 moment, number, command = sys.argv[1], float(sys.argv[2]), sys.argv[3:]
 counts = dict.fromkeys(("torn", "written", "renamed"), 0)
@@ -64,13 +66,13 @@ def peak_kib() -> int:
 
 
 os.fsync, Path.replace = synced, renamed  # type: ignore[assignment]
-import_module(f"vnca.cli.{command[0]}")
+command_at(HOMES[command[0]])
 begun = time.monotonic()
 if moment == "seconds":
     timer = threading.Timer(number, die)
     timer.daemon = True
     timer.start()
-code = import_module("vnca.cli").main(command)
+code = main(command)
 if moment == "never":
     print(json.dumps({**counts, "seconds": time.monotonic() - begun, "peak_kib": peak_kib()}))
 sys.exit(code)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from vnca.io.smoke import write_smoke
+from vnca.io import write_smoke
 from vnca.simulation import simulate
 
 pytestmark = [

@@ -11,7 +11,7 @@ import pytest
 from vnca.cli import main
 from vnca.core.volume import Volume
 from vnca.io.vdb import open_vdb
-from vnca.painting.roll import Painting, Roll, RollState
+from vnca.painting import Painting, Roll, RollState
 
 pytestmark = [
     pytest.mark.faults,

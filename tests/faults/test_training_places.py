@@ -25,7 +25,7 @@ def train(
     training: list[object], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> Train:
     """Trains, or goes on with a folder; the exit code, and the complaint if there was one."""
-    monkeypatch.setattr("vnca.training.preview.SIZE", 64)
+    monkeypatch.setattr("vnca.training.run.PREVIEW_SIZE", 64)
     monkeypatch.setattr(Thrift, "share", 0.5)
     monkeypatch.setattr(Thrift, "least_seconds", 0.0)
 

@@ -15,14 +15,14 @@ from pathlib import Path
 import torch
 
 import vnca.recipe.smoke  # noqa: F401
-from vnca.training import preview
+from vnca.training import run
 from vnca.training.checkpoint import Thrift
 
 KILLED = Path(__file__).with_name("killed.py")
 
 torch.optim.Adam([torch.zeros(1, requires_grad=True)])  # the first one imports more than torch did
 Thrift.share, Thrift.least_seconds = 0.5, 0.0
-preview.SIZE = 32
+run.PREVIEW_SIZE = 32
 for line in sys.stdin:
     printed, *arguments = json.loads(line)
     child = os.fork()

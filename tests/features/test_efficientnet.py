@@ -8,10 +8,10 @@ import torch
 from torch import Tensor
 
 from vnca.core.errors import BackendUnavailableError, FileFormatError, OptionError, ShapeError
+from vnca.features import FeatureNetwork
 from vnca.features import efficientnet as module
+from vnca.features.download import file_sha256, installed_file
 from vnca.features.efficientnet import FILE, LAYERS, PACKAGE, SHA256, STYLE_LAYERS, EfficientNet
-from vnca.features.installed import file_sha256, installed_file
-from vnca.features.network import FeatureNetwork
 
 # Shape, mean, root mean square, and four channels at (rows // 2, columns // 3), as the package
 # `efficientnet-lite-pytorch` 0.1.0 computes them of `waves`.

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.features.strokes import COARSEST, FINEST, picture_cells, stroke_width
 
 SIZE = 128

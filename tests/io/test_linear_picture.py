@@ -10,8 +10,8 @@ import OpenEXR
 import pytest
 from PIL import Image
 
+from vnca.core import AnyArray
 from vnca.core.errors import BackendUnavailableError, FileFormatError
-from vnca.core.typing import AnyArray
 from vnca.io.picture import read_image, read_style, write_image
 
 DATA = Path(__file__).parents[1] / "data"

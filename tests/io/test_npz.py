@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.lib import format as npy
 
+from vnca.core import AnyArray, Box
 from vnca.core.errors import FileFormatError, GridError
-from vnca.core.typing import AnyArray, Box
+from vnca.io import read_smoke, smoke_box
 from vnca.io.npz import occupied_box, read_npz_density, read_npz_smoke
-from vnca.io.smoke import read_smoke, smoke_box
 from vnca.io.smoke_format import SmokeFormat
 
 SHAPE = (6, 7, 5)  # x, y, z

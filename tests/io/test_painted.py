@@ -6,12 +6,12 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import GridError, OptionError, OutputError, ShapeError
-from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume
+from vnca.io import read_smoke, smoke_box, with_fitted_scale
 from vnca.io.painted import read_colour, write_painted, write_smoke
 from vnca.io.sequence import find_frames
-from vnca.io.smoke import read_smoke, smoke_box, with_fitted_scale
 from vnca.io.smoke_format import SmokeFormat
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 

@@ -5,9 +5,9 @@ import pytest
 
 from vnca.core.errors import FileFormatError
 from vnca.core.volume import Volume
+from vnca.io import SmokeFormat, read_smoke
 from vnca.io.painted import write_painted, write_smoke
 from vnca.io.provenance import Provenance, read_provenance
-from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.io.vdb import open_vdb, write_vdb
 
 PLAIN = SmokeFormat()

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vnca.core import AnyArray, Box, Index
 from vnca.core.errors import FileFormatError, GridError, OptionError, SequenceError
 from vnca.core.lattice import Lattice
-from vnca.core.typing import AnyArray, Box, Index
 from vnca.core.volume import Volume
+from vnca.io import SmokeFormat, read_smoke, smoke_box, with_fitted_scale, write_smoke
 from vnca.io.sequence import Frame
-from vnca.io.smoke import SmokeFormat, read_smoke, smoke_box, with_fitted_scale, write_smoke
 from vnca.io.smoke_format import reader_of, register_reader
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 

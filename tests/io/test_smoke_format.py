@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import GridError
 from vnca.core.lattice import MOST_CELLS, Lattice
-from vnca.core.typing import AnyArray, FloatArray
 from vnca.core.volume import Volume
 from vnca.io.smoke_format import on_lattice, on_one_lattice, own_cells, upright_world
 

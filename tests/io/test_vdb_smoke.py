@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vnca.core import Box
 from vnca.core.errors import GridError
-from vnca.core.typing import Box
-from vnca.io.smoke import read_smoke
+from vnca.io import read_smoke
 from vnca.io.smoke_format import SmokeFormat
 from vnca.io.vdb import Grid, Metadata, Tiles, Transform, Tree, open_vdb, write_vdb
 from vnca.io.vdb_smoke import read_density, read_vdb_smoke

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from vnca.core import AnyArray, Index
 from vnca.core.errors import GridError
-from vnca.core.typing import AnyArray, Index
 from vnca.core.volume import Volume
+from vnca.io import EXTRAPOLATED_CELLS, read_smoke, write_smoke
 from vnca.io.painted import write_painted
-from vnca.io.smoke import EXTRAPOLATED_CELLS, read_smoke, write_smoke
 from vnca.io.smoke_format import UNITS_METADATA, SmokeFormat
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 from vnca.io.vdb.layout import encode_string

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vnca.core import AnyArray, BoolArray, FloatArray, Index
 from vnca.core.errors import GridError, OptionError
 from vnca.core.field import Field
-from vnca.core.typing import AnyArray, BoolArray, FloatArray, Index
 from vnca.core.volume import Volume
 from vnca.io import velocity as in_fields
 from vnca.io import velocity as interpolation

@@ -10,13 +10,12 @@ from PIL import Image
 from torch import Tensor
 
 import vnca
+from vnca.core import FloatArray
 from vnca.core.colour import linear_to_srgb, srgb_to_linear
 from vnca.core.errors import OptionError, ShapeError
-from vnca.core.typing import FloatArray
-from vnca.features.load import load_network
-from vnca.features.network import FeatureNetwork
+from vnca.features import FeatureNetwork, load_network
+from vnca.losses import luma
 from vnca.losses.appearance import Appearance, AppearanceConfig, AppearanceLoss
-from vnca.losses.terms import luma
 
 SIZE = 48
 # The deeper ones take most of the time.

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from vnca.core.errors import OptionError
-from vnca.losses.motion import Motion, MotionConfig, compare_motion, motion_loss, supervised
+from vnca.losses import Motion, MotionConfig, compare_motion, motion_loss, supervised
 
 CONFIG = MotionConfig()
 

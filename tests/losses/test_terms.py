@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch.nn import functional
 
-from vnca.losses.terms import (
+from vnca.losses import (
     cosine_cost,
     luma,
     moment_distance,

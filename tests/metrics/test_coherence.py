@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from vnca.core.typing import Box, FloatArray
+from vnca.core import Box, FloatArray
 from vnca.metrics.coherence import LONG, Coherence, around, disagreement, mean_agreement
 from vnca.metrics.setup import Coloured, Pair, Seen, Setup, Viewpoint
 

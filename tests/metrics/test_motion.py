@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import torch
 
+from vnca.core import FloatArray
 from vnca.core.errors import BackendUnavailableError, GridError
-from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.metrics.motion import (
     dis,
@@ -19,8 +19,8 @@ from vnca.metrics.motion import (
     ours,
     transport_ratio,
 )
-from vnca.rendering.sample import sample
-from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.rendering.march import sample
+from vnca.rule import Rule, RuleConfig, Scales
 
 SHAPE = (14, 14, 14)
 EVERYWHERE = np.ones(SHAPE, dtype=bool)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from vnca.core.typing import AnyArray, FloatArray
+from vnca.core import AnyArray, FloatArray
 from vnca.metrics.setup import Pair, Seen, Viewpoint
 from vnca.metrics.structure import BINS, Likeness, StructureMetric, structure
 from vnca.metrics.style import StyleMetric

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from vnca.core import BoolArray, FloatArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError, ShapeError
-from vnca.core.typing import BoolArray, FloatArray
 from vnca.metrics.style import StyleDistances, StyleMetric, gap_closed, mean_distances, perceived
 
 SIZE = 96

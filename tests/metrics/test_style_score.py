@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from vnca.core import FloatArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import GridError
-from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
-from vnca.features.load import load_network
+from vnca.features import load_network
 from vnca.metrics.setup import Coloured, Pair, Seen, Setup, Viewpoint
 from vnca.metrics.style import StyleMetric
-from vnca.metrics.style_score import SIDES, Judge, measure_style, style_score
-from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.metrics.style_score import SIDES, Judge, measure_style, score_style
+from vnca.rule import Rule, RuleConfig, Scales
 
 SIZE = 64
 DISC = np.hypot(*(np.mgrid[:SIZE, :SIZE] - SIZE / 2)) < 24
@@ -38,7 +38,7 @@ def test_smoke_as_it_comes_closes_nothing(tiny_smoke: Volume, picture: FloatArra
     setup, metric = Setup.around([tiny_smoke], rule(), 64), StyleMetric(picture, 64)
     plain = Coloured.plain(tiny_smoke)
     pairs = [setup.look_twice(plain, plain, viewpoint) for viewpoint in SIDES]
-    found = style_score(metric, pairs)
+    found = score_style(metric, pairs)
     assert found is not None
     assert found.gap_closed == pytest.approx(0, abs=0.02)
     assert found.by_measure["palette"] == pytest.approx(0, abs=0.1)
@@ -50,7 +50,7 @@ def test_paint_of_the_right_colours_closes_more(tiny_smoke: Volume, picture: Flo
     random = np.random.default_rng(1)
     colour = picture.reshape(-1, 3)[random.integers(0, 64 * 80, tiny_smoke.density.shape)]
     painted = plain._replace(colour=colour)
-    found = style_score(
+    found = score_style(
         metric, [setup.look_twice(painted, plain, viewpoint) for viewpoint in SIDES]
     )
     assert found is not None

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vnca.core.volume import Volume
-from vnca.metrics.survey import DensityChange
-from vnca.painting.roll import Painting, RollState
+from vnca.metrics import DensityChange
+from vnca.painting import Painting, RollState
 
 
 def painting(smoke: Volume, density: np.ndarray) -> Painting:

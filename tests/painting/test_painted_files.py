@@ -8,19 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vnca.core import Box
 from vnca.core.field import Field
 from vnca.core.lattice import Lattice
-from vnca.core.typing import Box
 from vnca.core.volume import Volume
-from vnca.engine.session import Compute
+from vnca.engine import Compute
+from vnca.io import SmokeFormat, read_smoke, write_painted, write_smoke
 from vnca.io.sequence import find_frames
-from vnca.io.smoke import SmokeFormat, read_smoke, write_painted, write_smoke
 from vnca.io.smoke_format import on_lattice
 from vnca.io.vdb import open_vdb
-from vnca.painting.config import StylizeConfig
-from vnca.painting.roll import Painting, Roll
+from vnca.painting import Painting, Roll, StylizeConfig
+from vnca.rule import Rule
 from vnca.rule.model import Model
-from vnca.rule.rule import Rule
 
 KEPT = Path(__file__).parents[1] / "data" / "painting"
 PLAIN = SmokeFormat()

@@ -10,21 +10,18 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from vnca import painting as roll_module
+from vnca.core import Box, FloatArray, IntArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError
-from vnca.core.typing import Box, FloatArray, IntArray
 from vnca.core.volume import Volume
+from vnca.engine import Compute, Job, Session, StepSession
 from vnca.engine.automaton import Automaton, changing_rows, hash_cells
 from vnca.engine.domain import Domain
-from vnca.engine.session import Compute, Job, Session, StepSession
-from vnca.painting import roll as roll_module
-from vnca.painting.ahead import read_ahead
-from vnca.painting.config import StylizeConfig
-from vnca.painting.parts import SAMPLES
-from vnca.painting.roll import Painting, Roll, stylize
-from vnca.rule.decoder import Decoder
-from vnca.rule.paint import Between, colours, density_factors
-from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.painting import Painting, Roll, StylizeConfig, stylize
+from vnca.painting.frames import read_ahead
+from vnca.rule import Decoder, Rule, RuleConfig, Scales
+from vnca.rule.paint import SAMPLES, Between, colours, density_factors
 
 RULE = Rule.initial(RuleConfig(channels=4, hidden=3), Scales(), seed=0)
 BOX = Box((-10, -10, -10), (20, 20, 20))

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.rendering.brightness import gamma_for_cell_opacity, gamma_for_own_colour
-from vnca.rendering.paper import paper_composite
+from vnca.rendering.march import paper_composite
+from vnca.rule import gamma_for_cell_opacity, gamma_for_own_colour
 
 
 @pytest.mark.parametrize("opacity", [0.15, 0.95])

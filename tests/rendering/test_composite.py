@@ -4,8 +4,7 @@ import pytest
 import torch
 
 from vnca.core.errors import ShapeError
-from vnca.rendering.composite import composite, ray_weights
-from vnca.rendering.paper import paper_composite
+from vnca.rendering.march import composite, paper_composite, ray_weights
 
 
 def random_rays(rays: int = 5, samples: int = 12) -> tuple[torch.Tensor, torch.Tensor]:

@@ -6,8 +6,8 @@ import torch
 
 from vnca.core.camera import Orthographic
 from vnca.core.errors import OptionError, ShapeError
+from vnca.rendering import View, render
 from vnca.rendering.light import Light, LightVolume
-from vnca.rendering.view import View, render
 
 SIZE = 24
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.rendering.sample import _by_corners, sample
+from vnca.rendering.march import _by_corners, sample
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])

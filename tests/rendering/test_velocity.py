@@ -5,8 +5,7 @@ from torch.nn import functional
 
 from vnca.core.camera import Orthographic, Perspective, frame_box
 from vnca.core.errors import ShapeError
-from vnca.rendering.velocity import projected_velocity
-from vnca.rendering.view import render
+from vnca.rendering import projected_velocity, render
 
 SHAPE = (20, 20, 20)
 

@@ -3,13 +3,14 @@ import dataclasses
 import numpy as np
 import pytest
 
+from vnca.core import AnyArray, Box
 from vnca.core.colour import linear_to_srgb
 from vnca.core.errors import GridError, OptionError, ShapeError
 from vnca.core.lattice import Lattice, Region
-from vnca.core.typing import AnyArray, Box
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
-from vnca.rule import conditioning
+from vnca.recipe.texture import without_prior_weights
+from vnca.rule import Rule, RuleConfig, Scales, conditioning
 from vnca.rule.conditioning import (
     Conditioning,
     normalised_velocity,
@@ -17,8 +18,6 @@ from vnca.rule.conditioning import (
     register_conditioning,
 )
 from vnca.rule.paint import colours, density_factors
-from vnca.rule.rule import Rule, RuleConfig, Scales
-from vnca.training.pretraining import without_prior_weights
 
 SHAPE = (4, 2, 3)
 

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 
 from vnca.core.errors import ShapeError
-from vnca.engine.decode_weights import Weights
-from vnca.rule.decoder import Decoder
+from vnca.engine.automaton import DecoderWeights
+from vnca.rule import Decoder, Rule, RuleConfig, Scales
 from vnca.rule.paint import Between
-from vnca.rule.rule import Rule, RuleConfig, Scales
 
 
 def test_a_decoder_before_training_is_drawn_from_its_seed() -> None:
     one, same, other = (Decoder.initial(12, seed=seed) for seed in (1, 1, 2))
-    for a, b, shape in zip(one.weights, same.weights, Weights.shapes(12, 32), strict=True):
+    for a, b, shape in zip(one.weights, same.weights, DecoderWeights.shapes(12, 32), strict=True):
         assert a.dtype == np.float32
         assert a.shape == shape
         assert a.tobytes() == b.tobytes()

@@ -14,17 +14,15 @@ from hypothesis import strategies as st
 from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
+from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import FileFormatError, ModelError, OptionError, OutputError, ShapeError
 from vnca.core.lattice import Lattice, Region
-from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
 from vnca.io.smoke_format import SmokeFormat
-from vnca.rule import conditioning
+from vnca.rule import Decoder, Rule, RuleConfig, Scales, conditioning
 from vnca.rule.conditioning import Conditioning, register_conditioning
-from vnca.rule.decoder import Decoder
 from vnca.rule.model import MODEL_NAME, Model, from_record
-from vnca.rule.rule import Rule, RuleConfig, Scales
 
 
 @pytest.fixture

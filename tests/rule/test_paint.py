@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vnca.core import FloatArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import BackendUnavailableError
-from vnca.core.typing import FloatArray
+from vnca.engine import native
 from vnca.engine.domain import Border, Domain, subdivided
-from vnca.engine.native import step as native
-from vnca.rule.decoder import Decoder
+from vnca.rule import Decoder, Rule, RuleConfig, Scales
 from vnca.rule.paint import Between, colours, density_factors
-from vnca.rule.rule import Rule, RuleConfig, Scales
 
 BACKENDS = ["numpy"] if native.unavailable() else ["numpy", "native"]
 

@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vnca.simulation.solver import Forces, Smoke, advance, apply_forces, project
+from vnca.simulation import Forces, Smoke, advance, apply_forces, project
 
 STILL = Forces(buoyancy=0, confinement=0, dissipation=0, erosion=0, drag=0)
 

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig
-from vnca.rule.rule import Rule, RuleConfig
-from vnca.training.texture_config import SliceConfig, TextureConfig
-from vnca.training.texture_trainer import initial_rule
+from vnca.rule import Rule, RuleConfig
+from vnca.training.config import SliceConfig, TextureConfig
+from vnca.training.trainers import initial_rule
 
 
 @pytest.fixture(scope="session")

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 from PIL import Image
 
+from vnca.core import FloatArray
 from vnca.core.errors import OptionError
-from vnca.core.typing import FloatArray
 from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.mesh.texture import BaseColour
 from vnca.meshes.atlas import Placement, TexelMap, bake, fill, to_png, unwrapped

@@ -4,14 +4,10 @@ import numpy as np
 import pytest
 
 from vnca.losses.appearance import AppearanceConfig
-from vnca.rule.rule import PRIORS, Rule, Scales
+from vnca.recipe.texture import LARGEST_PICTURE, pretraining_config, without_prior_weights
+from vnca.rule import PRIORS, Rule, Scales
+from vnca.training.config import SmokeConfig
 from vnca.training.presets import preset
-from vnca.training.pretraining import (
-    LARGEST_PICTURE,
-    pretraining_config,
-    without_prior_weights,
-)
-from vnca.training.smoke_config import SmokeConfig
 
 
 def test_the_texture_is_of_the_rule_and_the_picture_that_smoke_is_trained_with() -> None:

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
+from vnca.core import FloatArray
 from vnca.core.errors import OptionError
-from vnca.core.typing import FloatArray
-from vnca.engine.session import open_session
+from vnca.engine import open_session
 from vnca.painting.block import Block, block_domain, border_jump, grow, sample_block
-from vnca.painting.parts import SAMPLES
-from vnca.rule.rule import Rule
+from vnca.rule import Rule
+from vnca.rule.paint import SAMPLES
 
 
 @pytest.fixture(scope="module")

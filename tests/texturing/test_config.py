@@ -4,10 +4,9 @@ import pytest
 
 from vnca.core.errors import OptionError
 from vnca.losses.appearance import AppearanceConfig
-from vnca.rule.rule import RuleConfig
-from vnca.training.config import PoolConfig
+from vnca.rule import RuleConfig
+from vnca.training.config import PoolConfig, SliceConfig, TextureConfig
 from vnca.training.presets import preset, preset_names
-from vnca.training.texture_config import SliceConfig, TextureConfig
 
 
 def test_presets_tell_cells_nothing() -> None:

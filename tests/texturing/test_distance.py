@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceLoss
 from vnca.metrics.style_score import slice_distances
-from vnca.training.texture_config import TextureConfig
+from vnca.training.config import TextureConfig
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vnca.core import AnyArray
 from vnca.core.camera import Orthographic
-from vnca.core.typing import AnyArray
 from vnca.meshes import raster
 from vnca.meshes.raster import fragments, visible, weights_at
 

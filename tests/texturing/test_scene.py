@@ -7,11 +7,10 @@ import torch
 import trimesh
 
 from vnca.io.mesh import read_mesh
-from vnca.rule.decoder import Decoder
+from vnca.rule import Decoder, Rule, RuleConfig, Scales
 from vnca.rule.paint import Between
-from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.training.config import SliceConfig
 from vnca.training.scenes.texture import BlockScene, mesh_views
-from vnca.training.texture_config import SliceConfig
 
 PLAIN = SliceConfig(size=32, count=1, pixels_per_cell=1.0, supersampling=1)
 BACKGROUND = torch.tensor([0.1, 0.2, 0.3])

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import torch
 
+from vnca.core import FloatArray
 from vnca.core.camera import view_axes
-from vnca.core.typing import FloatArray
 from vnca.painting.block import sample_block
-from vnca.training.scenes.slices import (
+from vnca.training.scenes.texture import (
     DIAGONAL,
     FAMILIES,
     UNSEEN,

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.core.typing import FloatArray
-from vnca.features.load import load_network
+from vnca.core import FloatArray
+from vnca.features import load_network
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig
-from vnca.rule.rule import DENSITY_CHANGE
-from vnca.training.config import PoolConfig
+from vnca.rule import DENSITY_CHANGE
+from vnca.training.config import PoolConfig, TextureConfig
 from vnca.training.loop import Trainer
-from vnca.training.preview import preview_sheet
-from vnca.training.scene import Scene
-from vnca.training.texture_config import TextureConfig
-from vnca.training.texture_trainer import texture_trainer
+from vnca.training.run import preview_sheet
+from vnca.training.scenes import Scene
+from vnca.training.trainers import texture_trainer
 
 Make = Callable[..., Trainer]
 

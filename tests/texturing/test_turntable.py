@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from vnca.core import FloatArray
+from vnca.core.camera import parse_colour
 from vnca.core.errors import OptionError
-from vnca.core.shot import parse_colour
-from vnca.core.typing import FloatArray
 from vnca.io.mesh import read_mesh
 from vnca.io.mesh.texture import put_on
 from vnca.meshes.atlas import Placement, bake, to_png, unwrapped

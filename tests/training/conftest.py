@@ -5,12 +5,12 @@ from importlib.resources import files
 import pytest
 from PIL import Image
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.features.vgg import VGG16
 from vnca.io.picture import fit, read_image
 from vnca.losses.appearance import AppearanceConfig
-from vnca.rule.rule import RuleConfig
-from vnca.training.smoke_config import SmokeConfig, ViewConfig
+from vnca.rule import RuleConfig
+from vnca.training.config import SmokeConfig, ViewConfig
 
 
 @pytest.fixture(scope="session")

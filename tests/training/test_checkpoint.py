@@ -9,17 +9,17 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
+from vnca.core import FloatArray
 from vnca.core.errors import FileFormatError, OptionError
-from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.flow import FlowNetwork
 from vnca.features.vgg import VGG16
-from vnca.losses.motion import MotionConfig
+from vnca.losses import MotionConfig
 from vnca.training.checkpoint import Checkpoint, Thrift, fingerprints
+from vnca.training.config import SmokeConfig
 from vnca.training.loop import Trainer
 from vnca.training.scenes.smoke import SmokeScene
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.trainers import smoke_trainer
 
 Make = Callable[..., Trainer]
 Change = Callable[[dict[str, torch.Tensor], dict[str, Any]], object]

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from vnca.core.errors import OutputError
-from vnca.training.curves import PATTERN, Curves
+from vnca.training.run import PATTERN, Curves
 
 accumulating = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
 

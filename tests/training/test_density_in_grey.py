@@ -7,15 +7,15 @@ import pytest
 import torch
 from torch import Tensor
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
+from vnca.losses import luma
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
-from vnca.losses.terms import luma
-from vnca.rule.rule import DENSITY_CHANGE, Rule, RuleConfig
+from vnca.rule import DENSITY_CHANGE, Rule, RuleConfig
+from vnca.training.config import SmokeConfig, ViewConfig
 from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
-from vnca.training.smoke_config import SmokeConfig, ViewConfig
-from vnca.training.smoke_trainer import choose_scales, smoke_trainer
+from vnca.training.trainers import choose_scales, smoke_trainer
 
 GREY = torch.tensor([0.2, 0.3, 0.1])
 SMALL = AppearanceConfig(layers=("relu1_1", "relu2_1", "relu3_1"), samples=128)

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 import torch
 
+from vnca.core import FloatArray
 from vnca.core.errors import DivergenceError
-from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import Appearance, AppearanceLoss
+from vnca.training.config import SmokeConfig
 from vnca.training.descent import KEEP_EVERY, MOST_ROLLBACKS, PATIENCE, Descent
 from vnca.training.loop import Trainer
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.trainers import smoke_trainer
 
 NAN = torch.tensor(torch.nan)
 

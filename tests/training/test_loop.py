@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
+from vnca.losses import MotionConfig
 from vnca.losses.appearance import Appearance, AppearanceLoss
-from vnca.losses.motion import MotionConfig
-from vnca.training.config import PoolConfig
+from vnca.training.config import PoolConfig, SmokeConfig
 from vnca.training.loop import Trainer
-from vnca.training.preview import preview_sheet
-from vnca.training.scene import Scene
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.run import preview_sheet
+from vnca.training.scenes import Scene
 from vnca.training.terms import Iteration, Term
+from vnca.training.trainers import smoke_trainer
 
 Make = Callable[..., Trainer]
 

@@ -6,10 +6,12 @@ import torch
 
 from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
-from vnca.rule.rule import Rule, Scales
-from vnca.training.config import PoolConfig
-from vnca.training.memory import (
+from vnca.rule import Rule, Scales
+from vnca.training.config import PoolConfig, SmokeConfig, ViewConfig
+from vnca.training.presets import preset
+from vnca.training.rollout import (
     SAMPLE_BYTES,
+    fewest_kept,
     is_out_of_memory,
     memory_advice,
     memory_budget,
@@ -18,10 +20,7 @@ from vnca.training.memory import (
     memory_used,
     states_to_keep,
 )
-from vnca.training.presets import preset
-from vnca.training.rollout import fewest_kept
 from vnca.training.scenes.smoke import SmokeScene
-from vnca.training.smoke_config import SmokeConfig, ViewConfig
 
 CPU = torch.device("cpu")
 MANY = replace(preset(SmokeConfig, "draft"), longest_rollout=64, view=ViewConfig(size=32))
@@ -37,8 +36,8 @@ def scene(tiny_smoke: Volume) -> SmokeScene:
 def memory(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
     """What the program has and what is free, to be changed."""
     memory = {"used": 1e9, "free": 4e9}
-    monkeypatch.setattr("vnca.training.memory.memory_used", lambda _: memory["used"])
-    monkeypatch.setattr("vnca.training.memory.memory_free", lambda _: memory["free"])
+    monkeypatch.setattr("vnca.training.rollout.memory_used", lambda _: memory["used"])
+    monkeypatch.setattr("vnca.training.rollout.memory_free", lambda _: memory["free"])
     return memory
 
 

@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from vnca.training.config import PoolConfig
-from vnca.training.pool import Pool
+from vnca.training.rollout import Pool
 
 SEED = torch.zeros(5, 4)
 NEVER = 10**9

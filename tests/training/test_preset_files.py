@@ -4,10 +4,8 @@ from pathlib import Path
 import pytest
 
 from vnca.core.errors import FileFormatError, OptionError
-from vnca.training.config import TrainingConfig
+from vnca.training.config import SmokeConfig, TextureConfig, TrainingConfig
 from vnca.training.presets import FOLDERS, as_toml, preset, preset_names
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.texture_config import TextureConfig
 
 ALL = [(kind, name) for kind in FOLDERS for name in preset_names(kind)]
 

@@ -6,16 +6,16 @@ import pytest
 import torch
 from torch import Tensor
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceLoss
 from vnca.rendering.colour import linear_to_srgb
-from vnca.rule.rule import Rule
+from vnca.rule import Rule
+from vnca.training.config import SmokeConfig
 from vnca.training.presets import preset, preset_names
 from vnca.training.scenes.smoke import SmokeScene
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.smoke_trainer import choose_scales, smoke_trainer
+from vnca.training.trainers import choose_scales, smoke_trainer
 
 GREY = 0.214
 """Linear, of sRGB ½."""

@@ -1,12 +1,12 @@
 import numpy as np
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
-from vnca.training.preview import SIZE, preview_sheet
+from vnca.training.config import SmokeConfig
+from vnca.training.run import PREVIEW_SIZE, preview_sheet
 from vnca.training.scenes.smoke import PREVIEW_VIEWS
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.trainers import smoke_trainer
 
 
 def test_a_preview_shows_the_style_and_every_view(
@@ -14,8 +14,8 @@ def test_a_preview_shows_the_style_and_every_view(
 ) -> None:
     sheet = preview_sheet(smoke_trainer(tiny_smoke, style, tiny_config, vgg), style)
     rows, columns, channels = sheet.shape
-    assert rows >= SIZE
-    assert columns >= SIZE * (1 + len(PREVIEW_VIEWS))
+    assert rows >= PREVIEW_SIZE
+    assert columns >= PREVIEW_SIZE * (1 + len(PREVIEW_VIEWS))
     assert channels == 3
     assert np.isfinite(sheet).all()
     assert sheet.min() >= 0

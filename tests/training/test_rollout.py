@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
+from vnca.engine import backend_named
 from vnca.engine.automaton import Weights, changing_rows, stencil
 from vnca.engine.domain import Domain
-from vnca.engine.session import backend_named
 from vnca.training.rollout import fewest_kept, layout, roll_out
 
 

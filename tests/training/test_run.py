@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from vnca.core.errors import OutputError
+from vnca.rule import Rule, RuleConfig, Scales
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.training.config import SmokeConfig
 from vnca.training.loop import Progress
 from vnca.training.run import RunFolder
-from vnca.training.smoke_config import SmokeConfig
 
 MODEL = Model(Rule.initial(RuleConfig(channels=4, hidden=2), Scales(), seed=0))
 

@@ -4,8 +4,7 @@ from typing import Any
 import pytest
 
 from vnca.core.errors import OptionError
-from vnca.training.config import PoolConfig
-from vnca.training.smoke_config import SmokeConfig, ViewConfig
+from vnca.training.config import PoolConfig, SmokeConfig, ViewConfig
 
 
 @pytest.mark.parametrize(

@@ -13,21 +13,23 @@ from typing import Any, Literal, NamedTuple
 
 import torch
 
-from vnca.bench.cases import CHANNELS, Case, Place
-from vnca.bench.contenders import DTYPES, PASSES, Contender, available, contender, require
-from vnca.bench.measurement import (
-    Difference,
-    Spread,
-    in_turns,
-    peak_mb,
-    require_agreement,
-    run_facts,
+from vnca.bench import Difference, Spread, in_turns, peak_mb, require_agreement, run_facts
+from vnca.bench.contenders import (
+    CHANNELS,
+    DTYPES,
+    PASSES,
+    Case,
+    Contender,
+    Place,
+    available,
+    contender,
+    require,
 )
+from vnca.core import Index
 from vnca.core.errors import OptionError
-from vnca.core.typing import Index
 from vnca.engine.automaton import NEIGHBOURS
-from vnca.engine.native.step import default_threads
-from vnca.rule.rule import PRIORS
+from vnca.engine.native import default_threads
+from vnca.rule import PRIORS
 
 ARRAYS = ("state", "gradient of the state", "gradient of W1", "gradient of b1", "gradient of W2")
 TOLERANCES = {

@@ -11,21 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from vnca.bench.measurement import Difference, Spread, in_turns, peak_mb, require_agreement
+from vnca.bench import Difference, Spread, in_turns, peak_mb, require_agreement
+from vnca.core import Box, FloatArray
 from vnca.core.errors import BackendUnavailableError
 from vnca.core.lattice import Lattice
-from vnca.core.typing import Box, FloatArray
 from vnca.core.volume import Volume
-from vnca.engine.session import Compute, choose
+from vnca.engine import Compute, choose
+from vnca.io import SmokeFormat, read_smoke, write_smoke
 from vnca.io.sequence import FrameSequence, find_frames
-from vnca.io.smoke import SmokeFormat, read_smoke, write_smoke
 from vnca.io.smoke_format import on_one_lattice
-from vnca.painting.config import StylizeConfig
+from vnca.painting import Roll, StylizeConfig
+from vnca.painting.frames import StillSmoke, require_dense
 from vnca.painting.painter import Painter
-from vnca.painting.roll import Roll
-from vnca.painting.still import StillSmoke
-from vnca.painting.thin import require_dense
-from vnca.rule.rule import Rule, RuleConfig, Scales
+from vnca.rule import Rule, RuleConfig, Scales
 from vnca.simulation import simulate
 
 BACKENDS = ("native", "numpy")

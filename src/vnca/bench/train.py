@@ -13,15 +13,15 @@ from typing import Any
 
 import torch
 
+from vnca.bench import Difference, Spread, peak_mb, require_agreement
 from vnca.bench.contenders import PlainUpdate
-from vnca.bench.measurement import Difference, Spread, peak_mb, require_agreement
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
 from vnca.core.volume import Volume
-from vnca.engine.session import StepSession
-from vnca.features.network import FeatureNetwork
+from vnca.engine import StepSession
+from vnca.features import FeatureNetwork
+from vnca.training.config import SmokeConfig
 from vnca.training.loop import Trainer
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.trainers import smoke_trainer
 
 PLAIN = ("plain", "compile")
 WARMUP = 2

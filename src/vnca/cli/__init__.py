@@ -1,13 +1,12 @@
-"""The command line, one file a subcommand."""
+"""The command line: subcommands, and what each of them is for."""
 
-import importlib
 import os
 import sys
 from collections.abc import Sequence
 
 import vnca
 from vnca.cli.help import ASKED, JSON_PROGRESS
-from vnca.cli.options import spelled_out, usage
+from vnca.cli.options import command_at, spelled_out, usage
 from vnca.cli.terminal import as_options, end_line, event, json_events, terminable
 from vnca.core.errors import Terminated, VncaError
 
@@ -25,6 +24,14 @@ COMMANDS = {
     "bench": "time steps, training and painting on this machine",
     "info": "describe a volume file, a model or a training run",
 }
+HOMES = {name: f"{name}:run" for name in COMMANDS} | {
+    "styles": "info:run_styles",
+    "simulate": "demo:run_simulate",
+    "stylize": "paint:run_stylize",
+    "render": "paint:run_render",
+    "ablate": "evaluate:run_ablate",
+}
+"""The function of each command, as `module:function` of this package."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -32,8 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Ctrl-C ends it with code 130, SIGTERM with 143.
 
-    Each subcommand is a module of this package with a function `run(arguments)`. It is imported
-    only when it is called, so that `vnca info` never waits for torch.
+    What a subcommand needs is imported only when it is called, so that `vnca info` never waits for
+    torch.
     """
     # On a machine that is busy, threads that spin while they wait cost several times the work.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
@@ -62,7 +69,7 @@ def _call(arguments: Sequence[str]) -> int:
         return _failed(f"'{name}' is not a command; expected one of {', '.join(COMMANDS)}")
     try:
         with terminable():
-            importlib.import_module(f"vnca.cli.{name}").run(rest)
+            command_at(HOMES[name])(rest)
     except VncaError as error:
         return _failed(str(error))
     except ModuleNotFoundError as error:

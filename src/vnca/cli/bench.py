@@ -13,7 +13,7 @@ from typing import Any, TypeVar, get_args
 
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
-from vnca.bench.measurement import append_csv, run_facts, write_json
+from vnca.bench import append_csv, run_facts, write_json
 from vnca.bench.stylize import (
     BACKENDS,
     PaintedSequence,
@@ -24,12 +24,12 @@ from vnca.bench.stylize import (
 )
 from vnca.cli.options import STDOUT, parse, print_json, run_subcommand
 from vnca.cli.terminal import Terminal, say
+from vnca.core import Index
 from vnca.core.errors import OptionError
 from vnca.core.files import writable_file
-from vnca.core.typing import Index
-from vnca.engine.native.step import default_threads
-from vnca.engine.session import Compute, choose
-from vnca.io.smoke import SmokeFormat, with_fitted_scale
+from vnca.engine import Compute, choose
+from vnca.engine.native import default_threads
+from vnca.io import SmokeFormat, with_fitted_scale
 from vnca.recipe.sequence import open_sequence
 from vnca.rule.model import Model
 

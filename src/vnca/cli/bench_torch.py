@@ -7,27 +7,27 @@ from pathlib import Path
 
 import torch
 
+from vnca.bench import run_facts
 from vnca.bench.contenders import available, require
-from vnca.bench.measurement import run_facts
 from vnca.bench.step import TOLERANCES, StepConfig, StepRun, measure_steps, prepare
 from vnca.bench.train import Training, measure_training
 from vnca.cli.bench import Rows, Tables, parse_bench, short
 from vnca.cli.demo import STYLE
 from vnca.cli.terminal import Terminal, say
+from vnca.core import FloatArray
 from vnca.core.errors import OptionError
-from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
-from vnca.engine.native.step import default_threads
-from vnca.features.load import load_network
+from vnca.engine.native import default_threads
+from vnca.features import load_network
+from vnca.io import SmokeFormat, missing_velocity
 from vnca.io.picture import read_style
-from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY
 from vnca.recipe.sequence import beside, read_alone
 from vnca.recipe.session import choose_device
 from vnca.simulation import simulate
-from vnca.training.memory import memory_budget
+from vnca.training.config import SmokeConfig
 from vnca.training.presets import DEFAULT, preset
-from vnca.training.smoke_config import SmokeConfig
+from vnca.training.rollout import memory_budget
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import tyro
 
+from vnca.core.camera import Shot
 from vnca.core.records import field_texts
-from vnca.core.shot import Shot
 
 SHORT = {
     "-o": "--out",

@@ -168,8 +168,13 @@ def run_subcommand(
         return
     if name not in commands:
         raise OptionError(f"vnca {command}: expected one of {', '.join(commands)}, got '{name}'")
-    module, _, function = homes[name].partition(":")
-    getattr(importlib.import_module(f"vnca.cli.{module}"), function)(rest)
+    command_at(homes[name])(rest)
+
+
+def command_at(home: str) -> Callable[[Sequence[str]], None]:
+    """The function of a command, imported now: `module:function` of this package."""
+    module, _, function = home.partition(":")
+    return getattr(importlib.import_module(f"vnca.cli.{module}"), function)
 
 
 def usage(call: str, purpose: str, commands: Mapping[str, str]) -> str:

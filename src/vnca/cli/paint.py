@@ -1,4 +1,4 @@
-"""`vnca paint SMOKE PICTURE --out DIR`, or `--style NAME`: the whole job."""
+"""`vnca paint`, the whole job, and two of its parts: `vnca stylize` and `vnca render`."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -10,8 +10,10 @@ import tyro
 
 from vnca.cli.options import parse
 from vnca.cli.terminal import Terminal, finishing
-from vnca.io.smoke import SmokeFormat
-from vnca.recipe import paint
+from vnca.io import SmokeFormat
+from vnca.painting import StylizeConfig
+from vnca.recipe import paint, painting, recorded_smoke, rendering
+from vnca.rule.model import Model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,3 +48,47 @@ def run(arguments: Sequence[str]) -> None:
     with finishing() as stop_if_asked:
         for _ in paint.run(options, Terminal(stop_if_asked)):
             pass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stylize(painting.StylizeRun):
+    """Paint a smoke sequence with a trained rule."""
+
+    model: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="MODEL")]
+    """A model file, or the folder of a training run."""
+    sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SEQUENCE")]
+    """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
+    """How smoke is read from files."""
+    config: StylizeConfig = field(default_factory=StylizeConfig)
+    """How the rule is applied."""
+
+
+def run_stylize(arguments: Sequence[str]) -> None:
+    """Read the options and paint; smoke is read as for training unless options say otherwise.
+
+    SIGTERM ends it once a frame is finished.
+    """
+    options = parse("stylize", Stylize, arguments)
+    model = Model.load(options.model)
+    smoke = recorded_smoke(options.model, model)
+    if smoke is not None:
+        missing: Any = tyro.MISSING
+        defaults = Stylize(model=missing, sequence=missing, out=missing, smoke=smoke)
+        options = parse("stylize", Stylize, arguments, default=defaults)
+    with finishing() as stop_if_asked:
+        for _ in painting.run(options, Terminal(stop_if_asked), model):
+            pass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Render(rendering.RenderRun):
+    """Make a film or a turntable of a sequence, painted or not, or a picture of each frame."""
+
+    sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SEQUENCE")]
+    """A folder, a pattern (name_%04d.vdb, name_####.vdb, name.$F4.vdb, name_*.vdb) or a file."""
+
+
+def run_render(arguments: Sequence[str]) -> None:
+    """Read the options and render."""
+    rendering.run(parse("render", Render, arguments), Terminal())

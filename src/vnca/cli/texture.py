@@ -12,11 +12,11 @@ import tyro
 
 from vnca.cli.options import parse, run_subcommand
 from vnca.cli.terminal import Progress, made, say, tracked
+from vnca.core import FloatArray
 from vnca.core.errors import OptionError
 from vnca.core.files import whole_file, writable_file
 from vnca.core.records import changed_fields
-from vnca.core.typing import FloatArray
-from vnca.engine.session import Compute
+from vnca.engine import Compute
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.film import FilmWriter
 from vnca.io.mesh import Mesh, read_mesh
@@ -28,9 +28,9 @@ from vnca.io.vdb import Grid, Transform, write_vdb
 from vnca.meshes.atlas import Placement, Unwrap, bake, to_png, unwrapped
 from vnca.meshes.turntable import Shader, Turntable, TurntableConfig, solid, textured
 from vnca.painting.block import KIND, LARGEST, SMALLEST, Block, grow
-from vnca.painting.parts import require_refinement
+from vnca.rule import Rule
 from vnca.rule.model import Model
-from vnca.rule.rule import Rule
+from vnca.rule.paint import require_refinement
 
 COMMANDS = {
     "train": "learn a solid texture from one picture",

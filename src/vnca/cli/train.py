@@ -10,11 +10,10 @@ import tyro
 from vnca.cli.options import chosen, is_given, parse
 from vnca.cli.terminal import Terminal
 from vnca.core.errors import OptionError
-from vnca.io.smoke import SmokeFormat
+from vnca.io import SmokeFormat
 from vnca.recipe import smoke, texture
+from vnca.training.config import SmokeConfig, TextureConfig
 from vnca.training.presets import DEFAULT, as_toml, preset, preset_names
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.texture_config import TextureConfig
 
 SHOW_PRESET = "--show-preset"
 _MISSING: Any = tyro.MISSING

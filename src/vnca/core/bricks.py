@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from vnca.core.typing import AnyArray, BoolArray, Box, IntArray
+from vnca.core import AnyArray, BoolArray, Box, IntArray
 
 EDGE, CELLS = 8, 512
 """Cells along an edge of a brick, and in it."""

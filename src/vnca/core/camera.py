@@ -1,4 +1,4 @@
-"""Cameras that look at a space in which +z is up.
+"""Cameras that look at a space in which +z is up, and how a film is taken with them.
 
 That space is the upright world (`Volume.index_to_upright`), or that of the cells where these are
 cubes and stand upright: then the centre of cell `[i, j, k]` is the point (i, j, k) and lengths are
@@ -13,12 +13,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import isfinite
 from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
+from vnca.core import AnyArray
+from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError
-from vnca.core.typing import AnyArray
 
 Point = tuple[float, float, float]
 
@@ -300,3 +302,50 @@ def _check_field_of_view(degrees: float) -> None:
 def _point(array: AnyArray) -> Point:
     x, y, z = array.tolist()
     return x, y, z
+
+
+@dataclass(frozen=True)
+class Shot:
+    """How a film is taken."""
+
+    rows: int = 384
+    """Height of the film, pixels."""
+    columns: int = 384
+    """Width of the film, pixels."""
+    azimuth: float = 0.0
+    """Where the camera stands, degrees around what it shows; 0 is the front, looking along +y."""
+    elevation: float = 5.0
+    """How far above the horizon it stands, degrees."""
+    turn: float = 0.0
+    """Degrees the camera walks around over the whole film; 360 is a turntable."""
+    fps: float = 24.0
+    """Frames per second of the film."""
+    background: str = "#101014"
+    """Colour behind what is shown, #rrggbb."""
+
+    def __post_init__(self) -> None:
+        if self.rows < 16 or self.columns < 16:
+            raise OptionError("`film.rows` and `film.columns`: at least 16 pixels are needed")
+        if not 0 < self.fps <= 1000:
+            raise OptionError(f"`film.fps` {self.fps}: must be positive, at most 1000")
+        if not -90 <= self.elevation <= 90:
+            raise OptionError(f"`film.elevation` {self.elevation}: must be -90 to 90 degrees")
+        if not (isfinite(self.azimuth) and isfinite(self.turn)):
+            raise OptionError("`film.azimuth` and `film.turn`: expected numbers of degrees")
+        parse_colour(self.background)
+
+
+def parse_colour(text: str) -> list[float]:
+    """Linear RGB of `#rrggbb`.
+
+    Raises:
+        OptionError: If the text is not such a colour.
+    """
+    digits = text.removeprefix("#")
+    try:
+        values = bytes.fromhex(digits)
+    except ValueError:
+        values = b""
+    if len(values) != 3:
+        raise OptionError(f"`film.background` '{text}': expected a colour such as #101014")
+    return srgb_to_linear(np.frombuffer(values, np.uint8) / 255).tolist()

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vnca.core import AnyArray, BoolArray, Box, Index, IntArray
 from vnca.core.bricks import (
     CELLS,
     EDGE,
@@ -20,7 +21,6 @@ from vnca.core.bricks import (
     sorted_bricks,
 )
 from vnca.core.errors import GridError
-from vnca.core.typing import AnyArray, BoolArray, Box, Index, IntArray
 
 MOST_CELLS = 2**27
 """A larger box (512³) becomes one array only if a good part of it holds something."""

@@ -13,10 +13,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from vnca.core import AnyArray, Box, FloatArray, Index
 from vnca.core.bricks import CELLS, EDGE, bricks_reached
 from vnca.core.errors import GridError
 from vnca.core.field import Field
-from vnca.core.typing import AnyArray, Box, FloatArray, Index
 
 Beyond = Literal["nothing", "nearest"]
 """What there is beyond the cells of an array: nothing, or what its nearest cell holds."""

@@ -7,9 +7,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from vnca.core import AnyArray, Box, FloatArray, Index
 from vnca.core.errors import ShapeError
 from vnca.core.field import Field, refined
-from vnca.core.typing import AnyArray, Box, FloatArray, Index
 
 T = TypeVar("T")
 

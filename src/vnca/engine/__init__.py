@@ -1,1 +1,347 @@
-"""Steps of the automaton: active cells, mask, stencil, and one folder a backend."""
+"""Where an automaton is computed: sessions, which hold it there, and the backends that open them.
+
+A backend is one file or folder here, with a `BACKEND` in it, and its name in `BACKENDS`. It opens
+sessions, which hold state, neighbours, conditioning and mask where they are computed; and it
+decodes states, which is chosen together with the step.
+"""
+
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vnca.core import FloatArray
+from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.engine.automaton import Automaton, Weights
+from vnca.engine.domain import Domain
+
+BACKENDS = ("native", "triton", "numpy", "reference")
+"""Names of backends, each that of its folder, the fastest on its kind of device first."""
+PRECISIONS = ("float32", "bfloat16")
+"""What a backend may round the factors of its products to; states and sums stay float32."""
+
+
+@dataclass(frozen=True)
+class Compute:
+    """How to compute."""
+
+    backend: str = "auto"
+    """auto takes the fastest that is there; native, triton, numpy or reference that one."""
+    device: str = "cpu"
+    """cpu, cuda, or one of several GPUs, such as cuda:1."""
+    precision: str = "float32"
+    """What the native backend rounds the factors of its products to; bfloat16 is quicker where the
+    processor has it."""
+    threads: int | None = None
+    """Threads of the native backend; one for each core unless given."""
+
+    def __post_init__(self) -> None:
+        if self.backend not in ("auto", *BACKENDS):
+            raise OptionError(f"`backend` {self.backend}: expected auto, {', '.join(BACKENDS)}")
+        if self.precision not in PRECISIONS:
+            raise OptionError(f"`precision` {self.precision}: expected {' or '.join(PRECISIONS)}")
+        if self.threads is not None and self.threads < 1:
+            raise OptionError(f"`threads` {self.threads}: at least 1 is needed")
+
+    @property
+    def device_type(self) -> str:
+        """Kind of the device, as torch names it."""
+        return self.device.partition(":")[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What a session is opened for.
+
+    Attributes:
+        automaton: Weights, filters and mask.
+        domain: The active cells.
+        conditioning: `[n, P]` of the cells.
+        compute: How to compute.
+        differentiable: Whether states are tensors through which gradients flow.
+    """
+
+    automaton: Automaton
+    domain: Domain
+    conditioning: Any
+    compute: Compute
+    differentiable: bool
+
+
+class Session(ABC):
+    """An automaton on the active cells of a domain.
+
+    What `upload` returns is a state in the backend's own arrays; nothing but `read` brings it back.
+    """
+
+    @abstractmethod
+    def upload(self, state: FloatArray) -> Any:
+        """A state `[n + 1, C]`, last row zero, where it is computed."""
+
+    @abstractmethod
+    def step(self, state: Any, number: int) -> Any:
+        """The state after the step of a number, from which its mask follows.
+
+        Differentiable in the state and the weights if the session was opened so.
+        """
+
+    @abstractmethod
+    def read(self, state: Any) -> FloatArray:
+        """The state as a numpy array."""
+
+    @abstractmethod
+    def conditioned(self, conditioning: Any) -> "Session":
+        """The same automaton on the same cells, conditioned on something else, `[n, P]`."""
+
+    def run(self, state: Any, numbers: range, watch: Callable[[], None] | None = None) -> Any:
+        """The state after the steps of some numbers; `watch` is called after each."""
+        for number in numbers:
+            state = self.step(state, number)
+            if watch is not None:
+                watch()
+        return state
+
+
+@dataclass(frozen=True, eq=False)
+class StepSession(Session):
+    """A session that draws the rows of cells that change, then updates them: of most backends.
+
+    Attributes:
+        automaton: Its weights are where the rest is.
+        neighbours: `[27, n]` rows of the state around each active cell.
+        hashes: `[n]` for the mask, the bits as int32.
+        stencil: `[5, 27]`.
+        conditioning: `[n, P]`.
+        draw: The rows `[m]` that change, from hashes, seed, step and probability.
+        update: The step, called as `vnca.engine.reference.equations.update` is.
+        place: Brings an array to where it is computed.
+        back: Brings one from there.
+    """
+
+    automaton: Automaton
+    neighbours: Any
+    hashes: Any
+    stencil: Any
+    conditioning: Any
+    draw: Callable[..., Any]
+    update: Callable[..., Any]
+    place: Callable[[Any], Any]
+    back: Callable[[Any], FloatArray]
+
+    @classmethod
+    def open(
+        cls,
+        job: Job,
+        *,
+        draw: Callable[..., Any],
+        update: Callable[..., Any],
+        place: Callable[[Any], Any] = np.asarray,
+        back: Callable[[Any], FloatArray] = np.asarray,
+    ) -> "StepSession":
+        """Bring everything to its place; without one it stays in main memory."""
+        automaton = job.automaton
+        return cls(
+            replace(automaton, weights=Weights(*map(place, automaton.weights))),
+            place(job.domain.neighbours),
+            place(job.domain.hashes.view(np.int32)),
+            place(automaton.stencil),
+            place(job.conditioning),
+            draw,
+            update,
+            place,
+            back,
+        )
+
+    def conditioned(self, conditioning: Any) -> "StepSession":
+        """See `Session.conditioned`."""
+        return replace(self, conditioning=self.place(conditioning))
+
+    def upload(self, state: FloatArray) -> Any:
+        """See `Session.upload`."""
+        return self.place(state)
+
+    def step(self, state: Any, number: int) -> Any:
+        """See `Session.step`."""
+        automaton = self.automaton
+        rows = self.draw(
+            self.hashes,
+            seed=automaton.seed,
+            step=number,
+            probability=automaton.update_probability,
+        )
+        surroundings = (self.neighbours, self.conditioning)
+        return self.update(state, rows, *surroundings, automaton.weights, self.stencil)
+
+    def read(self, state: Any) -> FloatArray:
+        """See `Session.read`."""
+        return self.back(state)
+
+
+class Backend(ABC):
+    """One way to compute steps.
+
+    Attributes:
+        name: As a user asks for it.
+        precisions: Those it can round the factors of its products to.
+        has_gradients: Whether its sessions can be differentiable.
+    """
+
+    name: str
+    precisions: tuple[str, ...] = ("float32",)
+    has_gradients = True
+
+    def unavailable(self, compute: Compute, *, differentiable: bool = False) -> str | None:
+        """Why it cannot compute so here, or nothing if it can."""
+        if differentiable and not self.has_gradients:
+            return "it has no gradients; use reference"
+        if compute.precision not in self.precisions:
+            return f"only the native backend has {compute.precision}; use precision float32"
+        return self.missing(compute)
+
+    @abstractmethod
+    def missing(self, compute: Compute) -> str | None:
+        """What it lacks here, or nothing: a device, a compiler, a package."""
+
+    @abstractmethod
+    def session(self, job: Job) -> Session:
+        """A session; only called where the backend is available."""
+
+    def update(self, *, threads: int | None = None, precision: str = "float32") -> Any:
+        """The bare differentiable step on tensors, called as that of the reference is.
+
+        For its sessions, and for comparisons of backends.
+
+        Raises:
+            BackendUnavailableError: If the backend has none.
+        """
+        del threads, precision
+        raise BackendUnavailableError(f"backend {self.name} has no step on tensors")
+
+
+def backend_named(name: str) -> Backend:
+    """A registered backend, of a name in `BACKENDS`."""
+    return import_module(f"vnca.engine.{name}").BACKEND
+
+
+def choose(compute: Compute, *, differentiable: bool = False) -> Backend:
+    """The backend to run.
+
+    `auto` says once on stderr what it takes if that is no fast one, or if it computes on a GPU.
+
+    Raises:
+        BackendUnavailableError: If the backend asked for cannot run here, or not so.
+    """
+    if compute.backend != "auto":
+        backend = backend_named(compute.backend)
+        reason = backend.unavailable(compute, differentiable=differentiable)
+        if reason is not None:
+            raise BackendUnavailableError(f"backend {backend.name} cannot run: {reason}")
+        return backend
+    on_cpu = compute.device_type == "cpu"
+    fast = backend_named("native" if on_cpu else "triton")
+    reason = fast.unavailable(compute, differentiable=differentiable)
+    if reason is None:
+        if not on_cpu:
+            _say_once(f"vnca: running the {fast.name} step on {compute.device_type}")
+        return fast
+    slow = backend_named("numpy" if on_cpu and not differentiable else "reference")
+    problem = slow.unavailable(compute, differentiable=differentiable)
+    if problem is not None:
+        raise BackendUnavailableError(
+            f"no backend can run: {fast.name}: {reason}; {slow.name}: {problem}"
+        )
+    _say_once(f"vnca: running the slow {slow.name} step: {reason}")
+    return slow
+
+
+def open_session(
+    automaton: Automaton,
+    domain: Domain,
+    conditioning: Any,
+    compute: Compute | None = None,
+    *,
+    differentiable: bool = False,
+) -> Session:
+    """An automaton on a domain, ready to run.
+
+    Args:
+        automaton: Weights, filters and mask.
+        domain: The active cells.
+        conditioning: `[n, P]` of the cells, an array or, for a differentiable session, a tensor.
+        compute: How to compute; the fastest way on the CPU unless given.
+        differentiable: Whether states are tensors through which gradients flow.
+
+    Raises:
+        BackendUnavailableError: If what was asked for cannot run here.
+    """
+    compute = compute or Compute()
+    backend = choose(compute, differentiable=differentiable)
+    return backend.session(Job(automaton, domain, conditioning, compute, differentiable))
+
+
+@cache
+def _say_once(line: str) -> None:
+    print(line, file=sys.stderr)
+
+
+def torch_decode(
+    backend: str = "auto", *, device: str = "cpu", threads: int | None = None
+) -> Callable[..., Any]:
+    """Differentiable decoding of tensors, called as `vnca.engine.reference.equations.decode` is.
+
+    Args:
+        backend: `auto`, `native`, `triton` or `reference`.
+        device: Kind of device that holds the state, as torch names it.
+        threads: How many the native kernel uses; the reference uses as many as torch does.
+
+    Raises:
+        BackendUnavailableError: If the backend asked for cannot run here.
+        OptionError: If there is no backend of that name.
+    """
+    chosen = choose(Compute(backend, device), differentiable=True).name
+    if chosen == "native":
+        from vnca.engine.native.autograd import decode
+
+        return partial(decode, threads=threads)
+    if chosen == "triton":
+        from vnca.engine.triton.decode import decode
+
+        return decode
+    from vnca.engine.reference.equations import decode
+
+    return decode
+
+
+class ArrayDecode(NamedTuple):
+    """Decoding of arrays.
+
+    Attributes:
+        decode: What is seen at points, called as `vnca.engine.native.decode` is.
+        decode_cells: What is seen in the parts of cells, called as `native.decode_cells` is.
+    """
+
+    decode: Callable[..., FloatArray]
+    decode_cells: Callable[..., FloatArray]
+
+
+def array_decode(backend: str = "auto", *, threads: int | None = None) -> ArrayDecode:
+    """Decoding of arrays, which takes no torch; arguments and errors are those of `torch_decode`.
+
+    Triton and the reference decode tensors only: where they compute the automaton, `auto` and numpy
+    decode what was read back.
+    """
+    backend = {"triton": "auto", "reference": "numpy"}.get(backend, backend)
+    if choose(Compute(backend)).name == "native":
+        from vnca.engine import native
+
+        return ArrayDecode(
+            partial(native.decode, threads=threads), partial(native.decode_cells, threads=threads)
+        )
+    from vnca.engine import numpy as array_reference
+
+    return ArrayDecode(array_reference.decode, array_reference.decode_cells)

@@ -1,4 +1,4 @@
-"""What an automaton is, wherever it is computed: its weights, what it perceives, and its mask.
+"""What an automaton is, wherever it is computed: weights, perception, mask and decoder.
 
 The mask of a cell is a hash of nothing but the seed, the step and the cell's index coordinates, so
 that every backend draws the same. A grid cut into tiles, a grid that grows and a run that restarts
@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vnca.core.typing import FloatArray, IntArray
+from vnca.core import FloatArray, IntArray
 
 NEIGHBOURS = 27
 FILTERS = 5
@@ -116,3 +116,44 @@ def mask_threshold(probability: float) -> np.uint32:
     At least one hash changes and one does not, however near to 0 or 1 the probability.
     """
     return np.uint32(min(max(round(probability * 2**32), 1), 2**32 - 1))
+
+
+OUTPUTS = 4
+"""What is seen: colour (3) as sRGB − ½, and Δd; added to the first channels of the state."""
+
+CORNERS = 8
+"""Cells around a point, z fastest."""
+
+
+class DecoderWeights(NamedTuple):
+    """Of three sine layers and a linear one; arrays, tensors, or whatever there is for each.
+
+    The frequency by which a sine layer is customarily multiplied is part of its weights and bias.
+
+    Attributes:
+        first: `[H, C]`, from the state.
+        first_bias: `[H]`.
+        second: `[H, H]`.
+        second_bias: `[H]`.
+        third: `[H, H]`.
+        third_bias: `[H]`.
+        output: `[4, H]`.
+        output_bias: `[4]`.
+    """
+
+    first: Any
+    first_bias: Any
+    second: Any
+    second_bias: Any
+    third: Any
+    third_bias: Any
+    output: Any
+    output_bias: Any
+
+    @classmethod
+    def shapes(cls, channels: int, units: int) -> "DecoderWeights":
+        """The shape of each."""
+        square, bias = (units, units), (units,)
+        return cls(
+            (units, channels), bias, square, bias, square, bias, (OUTPUTS, units), (OUTPUTS,)
+        )

@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
+from vnca.core import AnyArray, BoolArray, Box, FloatArray, Index, IntArray
 from vnca.core.bricks import EDGE, cells_at, runs_of_bricks
 from vnca.core.errors import OptionError
 from vnca.core.field import Field, dilated
-from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray, Index, IntArray
 from vnca.engine.automaton import OFFSETS, HashArray, hash_cells
 
 MOST_CELLS = 2**27

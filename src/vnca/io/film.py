@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from vnca.core import AnyArray, FloatArray
 from vnca.core.colour import luminance, srgb_to_linear
 from vnca.core.errors import BackendUnavailableError, OptionError, OutputError, ShapeError
 from vnca.core.files import whole_file
-from vnca.core.typing import AnyArray, FloatArray
 from vnca.io.picture import to_srgb8
 
 # Colour description codes of ITU-T H.273.

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vnca.core import AnyArray, FloatArray
 from vnca.core.colour import rec709_from
 from vnca.core.errors import BackendUnavailableError, FileFormatError
 from vnca.core.files import whole_file
-from vnca.core.typing import AnyArray, FloatArray
 
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 _LARGEST_HALF = 65504.0

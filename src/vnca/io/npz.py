@@ -20,10 +20,10 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
+from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import FileFormatError, GridError, OptionError
 from vnca.core.field import Field
 from vnca.core.files import existing_file
-from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.io.smoke_format import (
     NO_VELOCITY,
     NOT_WANTED,

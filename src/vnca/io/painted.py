@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.core.field import Field, divided
 from vnca.core.lattice import Lattice, Placement
-from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume, refined_transform
 from vnca.io.provenance import Provenance, without_provenance
 from vnca.io.smoke_format import (

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageCms, ImageOps
 
+from vnca.core import AnyArray, FloatArray
 from vnca.core.colour import linear_to_srgb, luminance, srgb_to_linear
 from vnca.core.errors import FileFormatError, OptionError, ShapeError, VncaError
 from vnca.core.files import existing_file, whole_file
-from vnca.core.typing import AnyArray, FloatArray
 from vnca.io.linear_picture import EXR_MAGIC, HDR_MAGICS, read_exr, read_hdr, write_exr
 
 _ENCODERS: dict[str, tuple[str, dict[str, Any]]] = {

@@ -14,10 +14,10 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
+from vnca.core import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.errors import FileFormatError, GridError, OptionError
 from vnca.core.field import Field
 from vnca.core.lattice import Lattice, Placement, upright_turn
-from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.io.velocity import VelocityUnits
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from vnca.core import Box, IntArray
 from vnca.core.bricks import bricks_beside, sorted_bricks
 from vnca.core.errors import FileFormatError, GridError
 from vnca.core.field import Field
-from vnca.core.typing import Box, IntArray
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
     NOT_WANTED,

@@ -10,10 +10,10 @@ from itertools import product
 
 import numpy as np
 
+from vnca.core import AnyArray, Box
 from vnca.core.bricks import CELLS, EDGE, bricks_beside, bricks_reached, sorted_bricks
 from vnca.core.errors import GridError
 from vnca.core.field import Field
-from vnca.core.typing import AnyArray, Box
 from vnca.io.smoke_format import (
     NO_VELOCITY,
     SmokeFormat,

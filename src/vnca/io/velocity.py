@@ -6,10 +6,10 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from vnca.core import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.bricks import CELLS, EDGE
 from vnca.core.errors import BackendUnavailableError, GridError, OptionError
 from vnca.core.field import Field, dilated
-from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.volume import Volume
 
 _LEAST_SHARE = 1e-6

@@ -10,11 +10,11 @@ from jaxtyping import Float, Int
 from torch import Tensor
 from torch.nn import functional
 
+from vnca.core import FloatArray
 from vnca.core.errors import OptionError, ShapeError
-from vnca.core.typing import FloatArray
-from vnca.features.network import FeatureNetwork
+from vnca.features import FeatureNetwork
 from vnca.features.strokes import picture_cells
-from vnca.losses.terms import (
+from vnca.losses import (
     Moments,
     luma,
     moment_distance,

@@ -8,8 +8,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from PIL import Image
 
+from vnca.core import AnyArray, FloatArray, IntArray
 from vnca.core.errors import BackendUnavailableError, GridError, OptionError
-from vnca.core.typing import AnyArray, FloatArray, IntArray
 from vnca.io.mesh import Mesh, Surface
 from vnca.io.mesh.texture import Unwrapping
 from vnca.io.picture import to_srgb8

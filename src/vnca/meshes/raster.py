@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vnca.core import AnyArray, IntArray
 from vnca.core.camera import Camera
-from vnca.core.typing import AnyArray, IntArray
 
 _BATCH = 1 << 20  # pixels at once
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vnca.core.camera import Orthographic, view_axes
+from vnca.core import AnyArray, FloatArray
+from vnca.core.camera import Orthographic, Shot, parse_colour, view_axes
 from vnca.core.errors import OptionError
-from vnca.core.shot import Shot, parse_colour
-from vnca.core.typing import AnyArray, FloatArray
 from vnca.io.mesh import Mesh
 from vnca.io.mesh.texture import BaseColour, base_colours
 from vnca.meshes.atlas import Placement

@@ -9,9 +9,9 @@ from typing import TypeVar
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from vnca.core import AnyArray, FloatArray
 from vnca.core.camera import Camera
 from vnca.core.colour import linear_to_srgb, luminance
-from vnca.core.typing import AnyArray, FloatArray
 from vnca.metrics.motion import Estimator
 from vnca.metrics.setup import OPAQUE, Pair, Seen, Setup
 from vnca.metrics.style import perceived

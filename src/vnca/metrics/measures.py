@@ -6,9 +6,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from vnca.metrics import Survey, TextureMotion
 from vnca.metrics.coherence import LONG, Agreement, mean_agreement
 from vnca.metrics.style_score import joined_style_score
-from vnca.metrics.survey import Survey, TextureMotion
 
 _Better = Literal["higher", "lower", "nearer to 0"]
 _NORMALISED = "normalised: 0 plain smoke, 1 the picture's own parts"

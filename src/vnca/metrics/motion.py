@@ -15,20 +15,18 @@ import torch
 from scipy.ndimage import gaussian_filter
 from torch import Tensor
 
+from vnca.core import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.errors import BackendUnavailableError, GridError
-from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.volume import Volume
-from vnca.engine.session import Compute
+from vnca.engine import Compute
 from vnca.features.flow import FlowNetwork
-from vnca.losses.motion import MotionConfig, compare_motion, supervised
-from vnca.losses.terms import luma
-from vnca.painting.config import StylizeConfig
-from vnca.painting.roll import Roll
+from vnca.losses import MotionConfig, compare_motion, luma, supervised
+from vnca.painting import Roll, StylizeConfig
 from vnca.rendering.colour import linear_to_srgb
-from vnca.rendering.sample import sample
-from vnca.rule.rule import COLOUR, Rule
+from vnca.rendering.march import sample
+from vnca.rule import COLOUR, Rule
+from vnca.training.config import ViewConfig
 from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
-from vnca.training.smoke_config import ViewConfig
 
 Estimator: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
 """Grey pictures `[row, column]` before and after, as displayed (sRGB, 0–1), to pixels moved,

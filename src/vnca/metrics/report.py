@@ -9,14 +9,14 @@ from io import BytesIO
 import numpy as np
 from PIL import Image
 
-from vnca.core.typing import AnyArray, FloatArray
+from vnca.core import AnyArray, FloatArray
 from vnca.io.picture import fit, to_srgb8
+from vnca.metrics import RING, Survey, TextureMotion
 from vnca.metrics.coherence import LONG
 from vnca.metrics.measures import Measure
 from vnca.metrics.plots import Line, Shade, plot
 from vnca.metrics.setup import Pair, Seen
 from vnca.metrics.style import StyleDistances
-from vnca.metrics.survey import RING, Survey, TextureMotion
 
 BACKGROUND = (0.01, 0.01, 0.01)
 """Linear colour behind the smoke."""

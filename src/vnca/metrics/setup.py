@@ -8,14 +8,13 @@ import numpy as np
 import torch
 from scipy.ndimage import gaussian_filter
 
+from vnca.core import AnyArray, BoolArray, Box, FloatArray, Index
 from vnca.core.camera import Orthographic, turntable
 from vnca.core.errors import GridError
-from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray, Index
 from vnca.core.volume import Volume
-from vnca.painting.roll import Painting
-from vnca.rendering.velocity import projected_velocity
-from vnca.rendering.view import render
-from vnca.rule.rule import SMOKE_THRESHOLD, Rule
+from vnca.painting import Painting
+from vnca.rendering import projected_velocity, render
+from vnca.rule import SMOKE_THRESHOLD, Rule
 from vnca.training.scenes.smoke import smoke_bounds
 
 OPAQUE = 0.8

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, gaussian_laplace
 from scipy.spatial import KDTree
 
-from vnca.core.typing import AnyArray, BoolArray, FloatArray
+from vnca.core import AnyArray, BoolArray, FloatArray
 from vnca.features.strokes import distance_inside, find_ridges
 from vnca.metrics.setup import Pair
 from vnca.metrics.style import StyleMetric, gap_closed, perceived

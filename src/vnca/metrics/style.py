@@ -11,8 +11,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from vnca.core import AnyArray, BoolArray, FloatArray
 from vnca.core.errors import OptionError, ShapeError
-from vnca.core.typing import AnyArray, BoolArray, FloatArray
 from vnca.io.picture import resize
 
 FILTERS = 48

@@ -13,20 +13,19 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from vnca.core import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.colour import linear_to_srgb
 from vnca.core.errors import GridError
-from vnca.core.typing import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.volume import Volume
-from vnca.engine.session import Compute
-from vnca.features.network import SMALLEST, FeatureNetwork
+from vnca.engine import Compute
+from vnca.features import SMALLEST, FeatureNetwork
 from vnca.io.smoke_format import on_one_lattice
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
 from vnca.metrics.setup import SIZE, Coloured, Pair, Setup, Viewpoint
 from vnca.metrics.style import StyleDistances, StyleMetric, gap_closed, mean_distances
-from vnca.painting.config import StylizeConfig
-from vnca.painting.roll import stylize
-from vnca.rule.rule import Rule
-from vnca.training.scenes.slices import FAMILIES, as_picture, shown, slice_points
+from vnca.painting import StylizeConfig, stylize
+from vnca.rule import Rule
+from vnca.training.scenes.texture import FAMILIES, as_picture, shown, slice_points
 
 FEWEST_OPAQUE = 64
 """Opaque pixels without which a view says nothing about style."""
@@ -224,7 +223,7 @@ def joined_style_score(parts: Iterable[StyleScore | None]) -> StyleScore:
     )
 
 
-def style_score(metric: StyleMetric, pairs: Sequence[Pair]) -> StyleScore | None:
+def score_style(metric: StyleMetric, pairs: Sequence[Pair]) -> StyleScore | None:
     """Compare views of a frame with the style picture where the smoke is opaque.
 
     None where it is opaque in none of them.
@@ -283,5 +282,5 @@ def measure_style(
         if (len(frames) - at) % every == 0:
             smoke = Coloured.painted(painting), Coloured.plain(painting.smoke)
             pairs = [setup.look_twice(*smoke, viewpoint) for viewpoint in SIDES]
-            parts.append(style_score(metric, pairs))
+            parts.append(score_style(metric, pairs))
     return joined_style_score(parts)

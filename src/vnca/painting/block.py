@@ -7,13 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import OptionError
-from vnca.core.typing import AnyArray, FloatArray
+from vnca.engine import Compute, open_session
 from vnca.engine.domain import Domain
-from vnca.engine.session import Compute, open_session
-from vnca.painting.parts import colour_means, parts_of_cells, require_refinement
-from vnca.rule.paint import Between, colours
-from vnca.rule.rule import Rule
+from vnca.rule import Rule
+from vnca.rule.paint import Between, colour_means, colours, parts_of_cells, require_refinement
 
 SMALLEST, LARGEST = 8, 384
 """Cells along an edge."""

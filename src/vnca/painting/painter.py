@@ -21,13 +21,12 @@ from vnca.core.errors import (
 from vnca.core.files import existing_file, remove_file, remove_leftovers
 from vnca.core.lattice import Lattice
 from vnca.core.volume import Volume
+from vnca.io import SmokeFormat, read_smoke, write_painted
 from vnca.io.provenance import Provenance, read_provenance
 from vnca.io.sequence import Frame, FrameSequence
-from vnca.io.smoke import SmokeFormat, read_smoke, write_painted
 from vnca.io.smoke_format import up_axis_of
-from vnca.painting.ahead import read_ahead
-from vnca.painting.roll import Roll, RollState
-from vnca.painting.still import StillSmoke
+from vnca.painting import Roll, RollState
+from vnca.painting.frames import StillSmoke, read_ahead
 from vnca.painting.unfinished import Source, Unfinished
 
 OnError = Literal["stop", "skip", "hold"]

@@ -12,7 +12,7 @@ from safetensors.numpy import save
 
 from vnca.core.errors import FileFormatError, OptionError
 from vnca.core.files import existing_file, whole_file
-from vnca.painting.roll import Roll, RollState
+from vnca.painting import Roll, RollState
 
 _METADATA = "vnca"
 _LONGEST_VALUE = 40

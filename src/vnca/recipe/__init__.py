@@ -1,1 +1,158 @@
-"""What `vnca` does from files to files: train, texture, stylize, render, evaluate, simulate."""
+"""What all recipes share: whom they tell how far they have come, and what was recorded before.
+
+The library prints nothing; whoever calls it may. Runs and models record their options and inputs,
+which are read back here.
+"""
+
+import dataclasses
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import UnionType
+from typing import Any, Literal, Protocol, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from vnca.core.errors import ModelError
+from vnca.io.smoke_format import SmokeFormat
+from vnca.rule.model import CONFIG_NAME, Model, from_record
+
+T = TypeVar("T")
+
+
+class Watch(Protocol):
+    """Is told what long work does, in the thread that does it.
+
+    What a method raises ends the work. `Cancelled` ends it as Ctrl-C does: everything finished so
+    far is kept, and the work can be resumed.
+    """
+
+    def progress(self, what: str, done: int, total: int, unit: str, note: str = "") -> None:
+        """Some of the work is done.
+
+        The first call for a piece of work says how much of it was done before.
+
+        Args:
+            what: The work, as a present participle: "training".
+            done: How many units are finished.
+            total: How many units there are.
+            unit: What is counted, in the plural: "frames".
+            note: What else there is to tell, such as a loss.
+        """
+
+    def note(self, line: str) -> None:
+        """Something that the user should know, in one line; arguments are in backquotes."""
+
+    def made(self, what: str, path: Path) -> None:
+        """A result is there, whole: what it is, as "film", and its file or folder."""
+
+
+class Silent:
+    """A `Watch` that tells nobody."""
+
+    def progress(self, what: str, done: int, total: int, unit: str, note: str = "") -> None:
+        """Do nothing."""
+
+    def note(self, line: str) -> None:
+        """Do nothing."""
+
+    def made(self, what: str, path: Path) -> None:
+        """Do nothing."""
+
+
+SILENT = Silent()
+
+
+def tracked(
+    items: Iterable[T], watch: Watch, what: str, total: int, unit: str, *, already: int = 0
+) -> Iterator[T]:
+    """`items`, each told to `watch` once the loop over them comes back for the next."""
+    watch.progress(what, already, total, unit)
+    for done, item in enumerate(items, already + 1):
+        yield item
+        watch.progress(what, done, total, unit)
+
+
+IN_MEMORY = Path("in-memory")
+"""In the place of the path of an input that came from no file."""
+PICTURE_CELLS = "picture_cells"
+"""What says in a model how many cells wide the rule was shown its picture, the shorter side."""
+
+
+def recorded(options: Any) -> dict[str, Any]:
+    """The fields of a dataclass, and of those inside it, as JSON values."""
+    return dataclasses.asdict(options, dict_factory=_json)
+
+
+def _json(fields: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {name: str(value) if isinstance(value, Path) else value for name, value in fields}
+
+
+def restored(kind: type[T], values: Mapping[str, Any]) -> T:
+    """An instance of the dataclass `kind` of what was recorded of one.
+
+    Raises:
+        TypeError: If a field is missing, unknown, or of another type.
+        OptionError: If the dataclass refuses a value.
+    """
+    hints = get_type_hints(kind)
+    if not isinstance(values, Mapping) or hints.keys() != values.keys():
+        raise TypeError(f"expected the options {', '.join(hints)}, got {', '.join(values)}")
+    return kind(**{name: _restored(hint, values[name], name) for name, hint in hints.items()})
+
+
+def _restored(hint: Any, value: Any, name: str) -> Any:
+    origin, inside = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        for one in inside:
+            with suppress(TypeError):
+                return _restored(one, value, name)
+    elif origin is Literal:
+        if value in inside:
+            return value
+    elif origin is tuple:
+        if isinstance(value, list):
+            return tuple(_restored(inside[0], item, name) for item in value)
+    elif dataclasses.is_dataclass(hint) and isinstance(hint, type):
+        return restored(hint, value)
+    elif hint is Path and isinstance(value, str):
+        return Path(value)
+    elif type(value) is hint or (hint is float and type(value) is int and abs(value) < 2**53):
+        return value
+    raise TypeError(f"{name}: {value!r} is not of its type")
+
+
+def recorded_smoke(path: Path, model: Model) -> SmokeFormat | None:
+    """How smoke was read for the training of a model, if its file, at `path`, tells.
+
+    Raises:
+        ModelError: If what it tells makes no sense.
+    """
+    smoke = model.training.get("smoke")
+    if not smoke:
+        return None
+    try:
+        return from_record(SmokeFormat, smoke)
+    except TypeError as error:
+        raise ModelError(f"{path}: damaged model metadata (smoke: {error})") from error
+
+
+def load(path: str | Path) -> Model:
+    """Read a model file, or the model in the folder of a run, with where its inputs are.
+
+    Raises:
+        FileFormatError: If the file is missing or empty.
+        ModelError: If it is not a model, of a newer format, or inconsistent.
+    """
+    path = Path(path)
+    folder = path if path.is_dir() else path.parent
+    try:
+        told = json.loads((folder / CONFIG_NAME).read_text())["inputs"]
+        inputs = {name: Path(where) for name, where in told.items() if isinstance(where, str)}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        inputs = {}
+    return dataclasses.replace(Model.load(path), inputs=inputs)
+
+
+def loaded(model: str | Path | Model) -> Model:
+    """The model itself, or that of a path; errors as of `load`."""
+    return model if isinstance(model, Model) else load(model)

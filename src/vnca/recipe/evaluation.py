@@ -10,34 +10,31 @@ from pathlib import Path
 from typing import Any
 
 import vnca
-from vnca.bench.measurement import run_facts
+from vnca.bench import run_facts
+from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import whole_file, writable_folder
 from vnca.core.lattice import Region
-from vnca.core.typing import AnyArray, FloatArray
+from vnca.core.records import distributed
 from vnca.core.volume import Volume
-from vnca.core.watch import SILENT, Watch, tracked
-from vnca.engine.session import Compute
-from vnca.features.load import load_network
+from vnca.engine import Compute
+from vnca.features import load_network
+from vnca.io import SmokeFormat, with_fitted_scale
 from vnca.io.picture import read_image, style_array
 from vnca.io.sequence import FrameSequence, format_frames
-from vnca.io.smoke import SmokeFormat, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY
+from vnca.metrics import Survey, survey
 from vnca.metrics.measures import Measure, measures
 from vnca.metrics.report import report
 from vnca.metrics.setup import SIZE, Setup
 from vnca.metrics.style import SMALLEST, StyleMetric
 from vnca.metrics.style_score import Judge
-from vnca.metrics.survey import Survey, survey
-from vnca.painting.config import StylizeConfig
-from vnca.painting.parts import require_refinement
-from vnca.painting.roll import stylize
-from vnca.painting.still import StillSmoke
-from vnca.painting.thin import require_dense
-from vnca.recipe.options import distributed
-from vnca.recipe.recorded import IN_MEMORY, PICTURE_CELLS, loaded, recorded_smoke
+from vnca.painting import StylizeConfig, stylize
+from vnca.painting.frames import StillSmoke, require_dense
+from vnca.recipe import IN_MEMORY, PICTURE_CELLS, SILENT, Watch, loaded, recorded_smoke, tracked
 from vnca.recipe.sequence import open_sequence, placed, region_of, sequence_region, volumes
 from vnca.rule.model import Model
+from vnca.rule.paint import require_refinement
 
 REPORT_NAME = "report.html"
 MEASURES_NAME = "report.json"

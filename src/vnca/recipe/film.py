@@ -1,5 +1,6 @@
 """Filming painted frames as they come; torch is needed once there is something to film."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
@@ -8,18 +9,51 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vnca.core.camera import frame_box
+from vnca.core import AnyArray, FloatArray
+from vnca.core.camera import Shot, frame_box, parse_colour
+from vnca.core.colour import linear_to_srgb, srgb_to_linear
 from vnca.core.errors import BackendUnavailableError, OptionError
-from vnca.core.shot import Shot, parse_colour
-from vnca.core.typing import AnyArray, FloatArray
 from vnca.core.volume import Volume
 from vnca.io.film import FilmWriter
-from vnca.rendering.background import soft_background
 
 if TYPE_CHECKING:
     import torch
 
-    from vnca.rendering.view import View
+    from vnca.rendering import View
+
+
+_RAISED, _LOWERED = 0.8, 0.4
+# Interleaved gradient noise: neighbouring pixels are spread evenly over a step.
+_NOISE = (52.9829189, 0.06711056, 0.00583715)
+
+
+def soft_background(colour: Sequence[float], rows: int, columns: int) -> FloatArray:
+    """A colour with a radial gradient around it: black stays black and white stays white there.
+
+    It is dithered by a step of 8-bit sRGB, the same in every picture, as a dark gradient would
+    show bands.
+
+    Args:
+        colour: Linear RGB, which the background has midway between the middle and the corners.
+        rows: Height, pixels.
+        columns: Width, pixels.
+
+    Returns:
+        Linear RGB `[rows, columns, 3]`.
+
+    Reference: Jimenez 2014, interleaved gradient noise.
+    """
+    row, column = np.mgrid[:rows, :columns].astype(np.float64)
+    y, x = (2 * row + 1) / rows - 1, (2 * column + 1) / columns - 1
+    away = np.sqrt((x**2 + y**2) / 2)  # 1 in the corners
+    weight = np.cos(np.pi * np.minimum(away, 1))[..., None]
+    base = np.asarray(colour, np.float64)
+    gain: AnyArray = np.where(weight > 0, _RAISED * (1 - base), _LOWERED)
+    soft = linear_to_srgb(base * (1 + gain * weight))
+    big, across, down = _NOISE
+    noise = (big * ((across * column + down * row) % 1)) % 1 - 0.5
+    dithered = soft + np.where(base > 0, noise[..., None] / 255, 0)
+    return srgb_to_linear(np.clip(dithered, 0, 1)).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -109,7 +143,7 @@ class Film:
             OutputError: If the film cannot be written.
         """
         try:
-            import vnca.rendering.view  # noqa: F401  A missing torch is reported before long work.
+            import vnca.rendering  # noqa: F401  A missing torch is reported before long work.
         except ModuleNotFoundError as error:
             raise BackendUnavailableError(
                 f"films need {error.name}: pip install 'vnca[train]'"
@@ -165,8 +199,8 @@ def picture(
     """The view of one frame by a camera framed on `bounds` that has turned by some degrees."""
     import torch
 
+    from vnca.rendering import render
     from vnca.rendering.light import Light, LightVolume, spacing_for
-    from vnca.rendering.view import render
 
     density, colour, place = frame.smoke.density, frame.colour, frame.smoke.cells_to_world
     # In lengths of a cell, single precision has room for a world of any size.

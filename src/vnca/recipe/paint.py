@@ -13,21 +13,17 @@ import numpy as np
 import vnca
 from vnca.core.errors import FileFormatError, OptionError, OutputError
 from vnca.core.files import existing_file, whole_file, writable_folder
-from vnca.core.watch import SILENT, Watch
+from vnca.core.records import changed, distributed
+from vnca.io import SmokeFormat, read_smoke
 from vnca.io.sequence import Frame, FrameSequence
-from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.io.smoke_format import NO_VELOCITY
-from vnca.painting.config import StylizeConfig
-from vnca.recipe import painting
+from vnca.painting import StylizeConfig
+from vnca.recipe import SILENT, Watch, painting, recorded, recorded_smoke
 from vnca.recipe.film import FilmConfig
-from vnca.recipe.options import changed, distributed
-from vnca.recipe.recorded import recorded, recorded_smoke
 from vnca.recipe.rendering import CELL_OPACITY
 from vnca.recipe.sequence import open_sequence
-from vnca.rendering.brightness import gamma_for_cell_opacity
-from vnca.rule.library import load_style, require_style
-from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import SMOKE_THRESHOLD, density_scale
+from vnca.rule import SMOKE_THRESHOLD, density_scale, gamma_for_cell_opacity
+from vnca.rule.model import MODEL_NAME, Model, load_style, require_style
 
 COMMAND = "paint"
 RUN, PAINTED, FILM = "run", "painted", "film.mp4"
@@ -261,8 +257,8 @@ def _asked(options: PaintRun) -> dict[str, Any]:
     asked |= {"picture": path, "vnca": vnca.__version__}
     if not options.is_trained:
         # A file of a user may have been changed.
+        from vnca.training.config import SmokeConfig
         from vnca.training.presets import preset
-        from vnca.training.smoke_config import SmokeConfig
 
         asked["preset"] = recorded(preset(SmokeConfig, options.preset))
     return asked
@@ -273,8 +269,8 @@ def _trained(options: PaintRun, sequence: FrameSequence, watch: Watch, *, goes_o
     # Painting with a model needs no torch.
     from vnca.recipe import smoke
     from vnca.training.checkpoint import CHECKPOINT_NAME
+    from vnca.training.config import SmokeConfig
     from vnca.training.presets import preset
-    from vnca.training.smoke_config import SmokeConfig
 
     folder = options.out / RUN
     if goes_on and (folder / CHECKPOINT_NAME).exists():

@@ -14,17 +14,15 @@ from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import remove_leftovers, writable_file, writable_folder
 from vnca.core.records import changed_fields
 from vnca.core.volume import refined_transform
-from vnca.core.watch import Watch
-from vnca.engine.session import Compute, choose
+from vnca.engine import Compute, choose
+from vnca.io import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.painted import read_colour
 from vnca.io.provenance import read_provenance
-from vnca.io.smoke import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
-from vnca.painting.config import StylizeConfig
+from vnca.painting import Roll, StylizeConfig
 from vnca.painting.painter import OnError, Painter
-from vnca.painting.parts import require_refinement
-from vnca.painting.roll import Roll
+from vnca.recipe import Watch
 from vnca.recipe.film import Film, FilmConfig, Shown
 from vnca.recipe.sequence import (
     open_sequence,
@@ -33,8 +31,9 @@ from vnca.recipe.sequence import (
     require_dense_enough,
     sequence_region,
 )
+from vnca.rule import Rule
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule
+from vnca.rule.paint import require_refinement
 
 
 @dataclass(frozen=True, kw_only=True)

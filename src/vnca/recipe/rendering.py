@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from vnca.core import FloatArray
 from vnca.core.errors import OptionError, SequenceError
 from vnca.core.files import existing_file, writable_file
-from vnca.core.records import changed_fields
-from vnca.core.typing import FloatArray
-from vnca.core.watch import SILENT, Watch, tracked
+from vnca.core.records import changed, changed_fields
+from vnca.io import SmokeFormat
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.film import contact_sheet
 from vnca.io.painted import read_colour
@@ -22,13 +22,12 @@ from vnca.io.picture import SUFFIXES as PICTURES
 from vnca.io.picture import write_image
 from vnca.io.provenance import read_provenance
 from vnca.io.sequence import FrameSequence
-from vnca.io.smoke import SmokeFormat
 from vnca.io.smoke_format import NO_VELOCITY, UpAxis
+from vnca.recipe import SILENT, Watch, tracked
 from vnca.recipe.film import Bounds, Film, FilmConfig, Shown, behind, picture
-from vnca.recipe.options import changed
 from vnca.recipe.sequence import open_sequence, region_bounds, sequence_bounds, volumes
 from vnca.recipe.stylizing import PaintedFrame
-from vnca.rendering.brightness import gamma_for_cell_opacity
+from vnca.rule import gamma_for_cell_opacity
 
 TRANSPARENT = (".png", ".exr")
 """Pictures that can go without a background."""

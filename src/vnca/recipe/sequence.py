@@ -9,21 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
+from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.camera import world_box
 from vnca.core.errors import SequenceError
 from vnca.core.files import existing_file
 from vnca.core.lattice import Lattice, Placement, Region
-from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume
-from vnca.core.watch import Watch
+from vnca.io import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
 from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
-from vnca.io.smoke import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
 from vnca.io.smoke_format import NO_VELOCITY, Extent, on_lattice, on_one_lattice
-from vnca.painting.ahead import read_ahead
+from vnca.painting.frames import StillSmoke, read_ahead, require_dense
 from vnca.painting.painter import BROKEN
-from vnca.painting.still import StillSmoke
-from vnca.painting.thin import require_dense
-from vnca.rule.rule import Rule
+from vnca.recipe import Watch
+from vnca.rule import Rule
 
 
 def open_sequence(pattern: str | Path, frames: str | None, watch: Watch) -> FrameSequence:

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import torch
 
+from vnca.core import FloatArray
 from vnca.core.errors import (
     DivergenceError,
     FileFormatError,
@@ -18,18 +19,15 @@ from vnca.core.errors import (
     OutOfMemoryError,
     VncaError,
 )
-from vnca.core.typing import FloatArray
-from vnca.core.watch import Watch
-from vnca.features.network import FeatureNetwork
+from vnca.features import FeatureNetwork
 from vnca.io.picture import resize, to_srgb8
-from vnca.recipe.recorded import PICTURE_CELLS, recorded, restored
+from vnca.recipe import PICTURE_CELLS, Watch, recorded, restored
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.config import TrainingConfig
 from vnca.training.loop import Trainer
-from vnca.training.memory import is_out_of_memory, memory_advice, memory_budget
-from vnca.training.preview import preview_sheet
-from vnca.training.run import NoFolder, RunFolder
+from vnca.training.rollout import is_out_of_memory, memory_advice, memory_budget
+from vnca.training.run import NoFolder, RunFolder, preview_sheet
 
 FINGERPRINTS = "fingerprints"
 """What says in the configuration of a run what its inputs were, wherever their files lie."""

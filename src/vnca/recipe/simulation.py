@@ -8,8 +8,8 @@ from typing import Literal
 from vnca.core.errors import OptionError
 from vnca.core.files import writable_folder
 from vnca.core.volume import Volume
-from vnca.core.watch import SILENT, Watch, tracked
-from vnca.io.smoke import write_smoke
+from vnca.io import write_smoke
+from vnca.recipe import SILENT, Watch, tracked
 from vnca.simulation import simulate as simulated_frames
 
 Scene = Literal["plume", "jets", "ring"]

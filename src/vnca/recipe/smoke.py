@@ -8,21 +8,17 @@ from typing import Any
 
 import torch
 
+from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import GridError, OptionError
 from vnca.core.files import remove_file
 from vnca.core.lattice import Lattice
-from vnca.core.typing import AnyArray, FloatArray
+from vnca.core.records import distributed
 from vnca.core.volume import Volume
-from vnca.core.watch import SILENT, Watch
-from vnca.features.load import load_network
-from vnca.features.network import FeatureNetwork
+from vnca.features import FeatureNetwork, load_network
+from vnca.io import SmokeFormat, missing_velocity
 from vnca.io.picture import read_style, style_array
-from vnca.io.smoke import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY, on_lattice
-from vnca.recipe import texture
-from vnca.recipe.grafting import rule_to_go_on_with
-from vnca.recipe.options import distributed
-from vnca.recipe.recorded import IN_MEMORY, load
+from vnca.recipe import IN_MEMORY, SILENT, Watch, load, texture
 from vnca.recipe.sequence import beside, read_alone
 from vnca.recipe.session import (
     ResumeOptions,
@@ -35,17 +31,16 @@ from vnca.recipe.session import (
     run_folder,
     shown_and_judged,
 )
+from vnca.recipe.texture import pretraining_config, rule_to_go_on_with, without_prior_weights
+from vnca.rule import Rule
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
-from vnca.training.memory import memory_budget
+from vnca.training.config import SmokeConfig, TextureConfig
 from vnca.training.presets import DEFAULT
 from vnca.training.presets import preset as preset_of
-from vnca.training.pretraining import pretraining_config, without_prior_weights
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.smoke_trainer import smoke_trainer
+from vnca.training.rollout import memory_budget
 from vnca.training.terms import Term
-from vnca.training.texture_config import TextureConfig
+from vnca.training.trainers import smoke_trainer
 
 COMMAND = "train"
 TERMS = "further terms of the loss"

@@ -8,23 +8,20 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
+from vnca.core import FloatArray
 from vnca.core.errors import OptionError
-from vnca.core.typing import FloatArray
+from vnca.core.records import changed, distributed
 from vnca.core.volume import Volume
-from vnca.core.watch import SILENT, Watch, tracked
-from vnca.engine.session import Compute
+from vnca.engine import Compute
+from vnca.io import SmokeFormat, with_fitted_scale
 from vnca.io.sequence import find_frames
-from vnca.io.smoke import SmokeFormat, with_fitted_scale
-from vnca.painting.config import StylizeConfig
+from vnca.painting import Painting, StylizeConfig
+from vnca.painting import stylize as stylize_volumes
+from vnca.painting.frames import StillSmoke, require_dense
 from vnca.painting.painter import OnError
-from vnca.painting.roll import Painting
-from vnca.painting.roll import stylize as stylize_volumes
-from vnca.painting.still import StillSmoke
-from vnca.painting.thin import require_dense
+from vnca.recipe import IN_MEMORY, SILENT, Watch, loaded, recorded_smoke, tracked
 from vnca.recipe.film import FilmConfig, Shown
-from vnca.recipe.options import changed, distributed
 from vnca.recipe.painting import StylizeRun, read_painted, run
-from vnca.recipe.recorded import IN_MEMORY, loaded, recorded_smoke
 from vnca.recipe.sequence import (
     open_sequence,
     placed,

@@ -1,21 +1,30 @@
-"""Training of a solid texture from one picture."""
+"""Training of a solid texture from one picture: for itself, or to begin training on smoke with.
 
+On smoke a rule learns first what the priors offer: a colour for each density and velocity, and
+grain. In a block, where nothing tells cells apart, it has to learn patterns; from there it goes
+on drawing them on smoke. A training may also start from a rule that was trained before.
+"""
+
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
-from vnca.core.typing import AnyArray, FloatArray
-from vnca.core.watch import SILENT, Watch
-from vnca.features.load import load_network
+from vnca.core import AnyArray, FloatArray
+from vnca.core.colour import linear_to_srgb
+from vnca.core.errors import OptionError
+from vnca.core.records import distributed
+from vnca.engine.automaton import FILTERS
+from vnca.features import load_network
 from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.picture import read_style, style_array
 from vnca.io.smoke_format import UpAxis
 from vnca.painting.block import KIND
-from vnca.recipe.grafting import graft
-from vnca.recipe.options import distributed
-from vnca.recipe.recorded import IN_MEMORY
+from vnca.recipe import IN_MEMORY, SILENT, Watch
 from vnca.recipe.session import (
     ResumeOptions,
     Session,
@@ -27,13 +36,146 @@ from vnca.recipe.session import (
     run_folder,
     shown_and_judged,
 )
-from vnca.rule.model import Model
+from vnca.rule import Rule
+from vnca.rule.model import Model, load_style, nearest_style, style_names
 from vnca.training.checkpoint import Checkpoint, fingerprints
-from vnca.training.memory import memory_budget
+from vnca.training.config import SmokeConfig, TextureConfig
+from vnca.training.loop import Trainer
 from vnca.training.presets import DEFAULT
 from vnca.training.presets import preset as preset_of
-from vnca.training.texture_config import TextureConfig
-from vnca.training.texture_trainer import texture_trainer
+from vnca.training.rollout import memory_budget
+from vnca.training.trainers import texture_trainer
+
+AUTO = "auto"
+"""In the place of the name of a style: the nearest to the picture."""
+SHAPE = ("channels", "hidden", "update_probability", "sobel_divisor", "laplacian_divisor")
+"""In what a rule must be like the texture that it begins with."""
+LARGEST_PICTURE = 128
+"""Cells along the shorter side of the picture, at most: its patterns are to fit the block."""
+
+
+def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | None:
+    """How the texture is trained for a training on smoke, or None if it is not to be.
+
+    Args:
+        config: The training on smoke. The rule is as large, and the picture in cells too.
+        picture: Cells along its shorter side, as the smoke is shown it.
+    """
+    iterations = round(config.texture * config.iterations)
+    if iterations == 0:
+        return None
+    plain = preset_of(TextureConfig, DEFAULT)
+    picture = min(picture, LARGEST_PICTURE)
+    return dataclasses.replace(
+        plain,
+        rule=dataclasses.replace(
+            config.rule, position_prior=False, density_prior=False, velocity_prior=False
+        ),
+        appearance=dataclasses.replace(
+            plain.appearance,
+            layers=config.appearance.layers,
+            style_scale=picture / plain.slice.cells,
+        ),
+        decoder=config.decoder,
+        graft=config.graft,
+        iterations=iterations,
+        features=config.features,
+        backend=config.backend,
+        seed=config.seed,
+    )
+
+
+def without_prior_weights(rule: Rule, conditioning: Sequence[str] | None = None) -> Rule:
+    """The rule with no weight on any prior: a texture has had none to learn what they mean.
+
+    Args:
+        rule: A texture.
+        conditioning: What the rule is to be conditioned on; as it is unless given.
+    """
+    config = rule.config
+    if conditioning is not None:
+        config = dataclasses.replace(config, conditioning=tuple(conditioning))
+    perceived = FILTERS * config.channels
+    hidden = np.zeros((config.hidden, config.inputs), np.float32)
+    hidden[:, :perceived] = rule.hidden[:, :perceived]
+    return dataclasses.replace(rule, hidden=hidden, config=config)
+
+
+def rule_to_go_on_with(path: Path, wanted: Rule) -> Rule:
+    """The rule of a model that a training on smoke begins with.
+
+    A rule of smoke keeps what it has learnt of priors; a texture has had none.
+
+    Args:
+        path: Of the model, or of the folder of its run.
+        wanted: What its weights are to fit.
+
+    Raises:
+        VncaError: If it cannot be read, or is a rule of another shape.
+    """
+    rule = Model.load(path).rule
+    misfit = _misfit(rule, wanted)
+    if misfit is not None:
+        raise OptionError(f"`init` {path}: {misfit}")
+    its = rule.config
+    knows_smoke = any(its.is_conditioned_on(name) for name in its.conditioning)
+    if knows_smoke and its.conditioning == wanted.config.conditioning:
+        return rule
+    return without_prior_weights(rule, wanted.config.conditioning)
+
+
+def _misfit(rule: Rule, wanted: Rule) -> str | None:
+    """In what a rule is shaped otherwise than another, if it is."""
+    for name in SHAPE:
+        its, ours = (getattr(r.config, name) for r in (rule, wanted))
+        if its != ours:
+            return f"was trained with `{name}` {its:g}; add that, in place of {ours:g}"
+    its, ours = (r.decoder.units if r.decoder is not None else 0 for r in (rule, wanted))
+    if its != ours:
+        return f"was trained with `decoder` {its}; add that, in place of {ours}"
+    return None
+
+
+def graft(
+    trainer: Trainer, source: str, style: FloatArray, watch: Watch, *, goes_on: bool
+) -> str | None:
+    """Let a training of a texture start from the rule of another picture.
+
+    Args:
+        trainer: Before its first iteration.
+        source: As of `TrainingConfig.graft`.
+        style: Linear RGB `[r, c, 3]`, to find the nearest style by.
+        watch: Is told what it starts from.
+        goes_on: Whether it has started already, and only the name is wanted.
+
+    Returns:
+        The name of the rule; None if it starts from nothing.
+
+    Raises:
+        VncaError: If the rule asked for cannot be read, or is of another shape.
+    """
+    wanted = trainer.rule()
+    if source == "none":
+        return None
+    if source in (AUTO, *style_names()):
+        is_auto = source == AUTO
+        name = nearest_style(linear_to_srgb(style.clip(0, 1))) if is_auto else source
+        rule = load_style(name).rule
+        misfit = _misfit(rule, wanted)
+        if is_auto and misfit is not None:
+            watch.note("no style of the library has such a rule; training starts from nothing")
+            return None
+        what = f"`graft` {name}"
+    else:
+        rule, name = Model.load(Path(source)).rule, Path(source).name
+        misfit, what = _misfit(rule, wanted), f"`graft` {source}"
+    if misfit is not None:
+        raise OptionError(f"{what}: {misfit}")
+    if not goes_on:
+        watch.note(f"starting from the rule of {name}")
+        trainer.begin_with(without_prior_weights(rule, wanted.config.conditioning))
+    return name
+
 
 COMMAND = "texture train"
 

@@ -14,10 +14,10 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional
 
+from vnca.core import AnyArray
 from vnca.core.camera import view_axes
 from vnca.core.errors import OptionError, ShapeError
-from vnca.core.typing import AnyArray
-from vnca.rendering.sample import sample
+from vnca.rendering.march import sample
 
 FINEST = 96
 """Cells of a light volume along the longest side of what is lit: shadows are soft."""

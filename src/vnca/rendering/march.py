@@ -1,14 +1,19 @@
-"""Where along each ray there is smoke to sample.
+"""Along the rays: where there is smoke to sample, its samples, and the light they add up to.
 
-Everything here is about positions only, so nothing is differentiated.
+Emission and absorption, or the integrand as the VNCA paper prints it, for comparison with its
+figures. Positions are not differentiated; values and what is gathered from them are.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional
+
+from vnca.core.errors import ShapeError
 
 # Candidate samples looked at together. It bounds the memory of large pictures, and a few tens of
 # megabytes are reused from the allocator where hundreds are mapped and cleared each time anew.
@@ -43,7 +48,7 @@ class Samples:
 
 
 @torch.no_grad()
-def march(
+def samples_along(
     density: Tensor,
     origins: Tensor,
     directions: Tensor,
@@ -137,3 +142,157 @@ def _look_up(reach: Tensor, points: Tensor) -> Tensor:
     )
     flat = (x * reach.shape[1] + y) * reach.shape[2] + z
     return reach.view(-1)[flat]
+
+
+def sample(field: Float[Tensor, "x y z c"], points: Float[Tensor, "n 3"]) -> Float[Tensor, "n c"]:
+    """Trilinear interpolation at points in cell coordinates.
+
+    Differentiable in `field`. The field is zero outside its array, to which it fades over
+    the last cell.
+
+    Args:
+        field: Values at cell centres; cell `[i, j, k]` is the point (i, j, k).
+        points: Cell coordinates (x, y, z), of the field's dtype.
+    """
+    # On CUDA the gradient of grid_sample adds up in any order, so that no two runs are equal.
+    return _by_corners(field, points) if field.is_cuda else _by_grid_sample(field, points)
+
+
+def _by_grid_sample(field: Tensor, points: Tensor) -> Tensor:
+    # grid_sample puts -1 and 1 on the outer faces of the border cells and wants (z, y, x).
+    size = points.new_tensor(field.shape[:3])
+    where = ((2 * points + 1) / size - 1).flip(-1)
+    values = functional.grid_sample(
+        field.permute(3, 0, 1, 2)[None],
+        where[None, None, None],
+        mode="bilinear",
+        padding_mode="zeros",
+        align_corners=False,
+    )
+    return values[0, :, 0, 0].T
+
+
+def _by_corners(field: Tensor, points: Tensor) -> Tensor:
+    lower = points.floor()
+    part = points - lower
+    size = torch.tensor(field.shape[:3], device=field.device)
+    cells = field.reshape(-1, field.shape[3])
+    values = cells.new_zeros(len(points), cells.shape[1])
+    for corner in product((0, 1), repeat=3):
+        step = torch.tensor(corner, device=field.device)
+        at = lower.long() + step
+        weight = torch.where(step.bool(), part, 1 - part).prod(-1)
+        weight = weight * ((at >= 0) & (at < size)).all(-1)
+        x, y, z = torch.minimum(at.clamp_min(0), size - 1).unbind(-1)
+        values = values + weight[:, None] * cells.index_select(0, (x * size[1] + y) * size[2] + z)
+    return values
+
+
+def ray_weights(
+    extinction: Float[Tensor, "rays samples"], *, step: float
+) -> tuple[Float[Tensor, "rays samples"], Float[Tensor, " rays"]]:
+    """How much each sample contributes to its ray, and what is left at the end of it.
+
+    Differentiable in `extinction`. The weights of a ray and its final transmittance add up
+    to one.
+
+    Args:
+        extinction: σ, 1/cell, non-negative, near to far.
+        step: Sample spacing, cells.
+
+    Returns:
+        Weights T_k α_k, and the transmittance behind the last sample.
+
+    Reference: Max 1995, eq. 6; derivation in this folder's README.
+    """
+    thickness = extinction * step
+    reached = torch.cumsum(thickness, dim=1)
+    weights = torch.exp(thickness - reached) * -torch.expm1(-thickness)
+    return weights, torch.exp(-thickness.sum(dim=1))
+
+
+def composite(
+    extinction: Float[Tensor, "rays samples"],
+    colour: Float[Tensor, "rays samples 3"],
+    *,
+    step: float,
+) -> tuple[Float[Tensor, "rays 3"], Float[Tensor, " rays"]]:
+    """Emission–absorption colour and opacity along each ray, near to far.
+
+    Differentiable in `extinction` and `colour`.
+
+    Args:
+        extinction: σ, 1/cell, non-negative.
+        colour: Linear RGB.
+        step: Sample spacing, cells.
+
+    Returns:
+        Premultiplied linear RGB, and opacity in [0, 1].
+
+    Raises:
+        ShapeError: If the sample counts differ.
+
+    Reference: Max 1995, eq. 6; derivation in this folder's README.
+    """
+    check_samples(extinction, colour)
+    weights, transmittance = ray_weights(extinction, step=step)
+    return gather(weights, colour), 1 - transmittance
+
+
+def gather(
+    weights: Float[Tensor, "rays samples"], colour: Float[Tensor, "rays samples c"]
+) -> Float[Tensor, "rays c"]:
+    """The weighted sum of the samples of each ray. Differentiable in both."""
+    return torch.einsum("rs,rsc->rc", weights, colour)
+
+
+def check_samples(extinction: Tensor, colour: Tensor) -> None:
+    """Raise `ShapeError` unless there is one RGB colour for every sample."""
+    if colour.shape != (*extinction.shape, 3):
+        raise ShapeError(
+            f"colour along rays: expected {(*extinction.shape, 3)} to match the extinction, "
+            f"got {tuple(colour.shape)}"
+        )
+
+
+def paper_weights(
+    density: Float[Tensor, "rays samples"], *, gamma: float
+) -> tuple[Float[Tensor, "rays samples"], Float[Tensor, " rays"]]:
+    """The paper's weights d_k τ_k, and the transmittance behind the last sample.
+
+    Differentiable in `density`. τ_k counts the absorption of sample k itself, and the
+    emission d_k does not scale with γ; so the weights of a ray tend to 1/γ, not to its
+    opacity, and they depend on the spacing of the samples, which is one cell.
+
+    Args:
+        density: max(d (1 + Δd), 0), near to far, one sample a cell.
+        gamma: Absorption of one cell of density one.
+    """
+    transmittance = torch.exp(-gamma * torch.cumsum(density, dim=1))
+    return density * transmittance, torch.exp(-gamma * density.sum(dim=1))
+
+
+def paper_composite(
+    density: Float[Tensor, "rays samples"],
+    colour: Float[Tensor, "rays samples 3"],
+    *,
+    gamma: float,
+) -> tuple[Float[Tensor, "rays 3"], Float[Tensor, " rays"]]:
+    """The paper's pixel colour, and one minus the final transmittance as opacity.
+
+    Differentiable in `density` and `colour`.
+
+    Args:
+        density: max(d (1 + Δd), 0), near to far, one sample a cell.
+        colour: Linear RGB.
+        gamma: Absorption of one cell of density one.
+
+    Raises:
+        ShapeError: If the sample counts differ.
+
+    Reference: VNCA, the equation for P; this folder's README lists what differs from
+    `composite`.
+    """
+    check_samples(density, colour)
+    weights, transmittance = paper_weights(density, gamma=gamma)
+    return gather(weights, colour), 1 - transmittance

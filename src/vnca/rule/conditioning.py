@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vnca.core import FloatArray
 from vnca.core.errors import GridError, OptionError, ShapeError
 from vnca.core.lattice import Placement
-from vnca.core.typing import FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
 
 if TYPE_CHECKING:
-    from vnca.rule.rule import Rule
+    from vnca.rule import Rule
 
 SPEED_LIMIT = 2.0
 """No cell is conditioned on a normalised speed above this: training has hardly met faster smoke,

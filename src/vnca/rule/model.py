@@ -1,9 +1,13 @@
-"""The model file: a rule as safetensors with JSON metadata. Data only, never code."""
+"""The model file: a rule as safetensors with JSON metadata. Data only, never code.
+
+The styles of the library are such files too, which come with the package.
+"""
 
 import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -13,19 +17,18 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 import vnca
+from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import ModelError, OptionError, ShapeError
 from vnca.core.files import existing_file, whole_file
 from vnca.core.lattice import Lattice, Region
-from vnca.core.typing import Box, FloatArray
-from vnca.engine.decode_weights import Weights
+from vnca.engine.automaton import DecoderWeights
+from vnca.rule import CONDITIONING, Decoder, Rule, RuleConfig, Scales
 from vnca.rule.conditioning import (
     Conditioning,
     conditioning_named,
     is_known,
     register_conditioning,
 )
-from vnca.rule.decoder import Decoder
-from vnca.rule.rule import CONDITIONING, Rule, RuleConfig, Scales
 
 FORMAT_VERSION = 3
 """The newest that is read. A model is written in the oldest that holds it: 2 with a decoder, 3 if
@@ -41,7 +44,7 @@ FORMER_NAMES = {"reach": "dilation"}
 _METADATA = "vnca"
 _WEIGHTS = ("hidden", "bias", "output")
 _STYLE = "style"
-_DECODER = tuple(f"decoder.{name}" for name in Weights._fields)
+_DECODER = tuple(f"decoder.{name}" for name in DecoderWeights._fields)
 _FARTHEST = 1e30  # in the world, or of a cell's size
 _EXACT = 2**53  # whole numbers up to here are floats
 
@@ -166,7 +169,7 @@ def _decoder(tensors: dict[str, NDArray[Any]]) -> Decoder | None:
     """
     if tensors.keys().isdisjoint(_DECODER):
         return None
-    return Decoder(Weights(*(_single_precision(name, tensors[name]) for name in _DECODER)))
+    return Decoder(DecoderWeights(*(_single_precision(name, tensors[name]) for name in _DECODER)))
 
 
 def _oldest_format(rule: Rule) -> int:
@@ -286,3 +289,70 @@ def _check_format(path: Path, version: Any) -> None:
             f"{path}: model format {version} is newer than this vnca reads ({FORMAT_VERSION}); "
             "upgrade vnca"
         )
+
+
+SUFFIX = ".safetensors"
+THUMBNAIL = ".webp"
+"""Of the picture, beside each model, of smoke painted with it."""
+_FOLDER = files("vnca.data").joinpath("styles")
+
+
+def style_names() -> list[str]:
+    """The styles that there are, in alphabetical order."""
+    names = (file.name for file in _FOLDER.iterdir())
+    return sorted(name.removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX))
+
+
+def require_style(name: str) -> None:
+    """Raise `OptionError` unless there is a style of that name."""
+    names = style_names()
+    if name not in names:
+        raise OptionError(f"`style` {name}: expected one of {', '.join(names)}")
+
+
+def load_style(name: str) -> Model:
+    """A style of the library.
+
+    Raises:
+        OptionError: If there is none of that name.
+    """
+    require_style(name)
+    with as_file(_FOLDER.joinpath(name + SUFFIX)) as path:
+        return Model.load(path)
+
+
+def style_thumbnail(name: str) -> bytes:
+    """A picture of smoke painted in a style, the bytes of a WebP file."""
+    return _FOLDER.joinpath(name + THUMBNAIL).read_bytes()
+
+
+def nearest_style(picture: FloatArray) -> str:
+    """The style whose picture has the palette most like that of another.
+
+    By the Fréchet distance between the colours of both as normal distributions.
+
+    Args:
+        picture: sRGB from 0 to 1, `[r, c, 3]`.
+    """
+    ours = _palette(picture)
+    distances = {}
+    for name in style_names():
+        style = load_style(name).style
+        assert style is not None, "a style of the library has its picture"
+        distances[name] = _distance(ours, _palette(style / 255))
+    return min(distances, key=lambda name: distances[name])
+
+
+def _palette(picture: AnyArray) -> tuple[AnyArray, AnyArray]:
+    """Mean and covariance of the colours."""
+    colours = picture.reshape(-1, 3).astype(np.float64)
+    return colours.mean(0), np.cov(colours.T)
+
+
+def _distance(one: tuple[AnyArray, AnyArray], other: tuple[AnyArray, AnyArray]) -> float:
+    """The squared Fréchet distance (Dowson and Landau 1982)."""
+    (mean, covariance), (other_mean, other_covariance) = one, other
+    # The eigenvalues of a product of two such matrices are real and not negative.
+    product = np.linalg.eigvals(covariance @ other_covariance).real.clip(0)
+    spread = np.trace(covariance) + np.trace(other_covariance) - 2 * np.sqrt(product).sum()
+    return float(((mean - other_mean) ** 2).sum() + spread)

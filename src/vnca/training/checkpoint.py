@@ -19,13 +19,13 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 import vnca
+from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import FileFormatError, OptionError, OutputError
 from vnca.core.files import existing_file, whole_file
-from vnca.core.typing import AnyArray, FloatArray
-from vnca.features.network import FeatureNetwork
+from vnca.features import FeatureNetwork
+from vnca.training import Snapshot
 from vnca.training.config import TrainingConfig
 from vnca.training.loop import Trainer
-from vnca.training.snapshot import Snapshot
 
 CHECKPOINT_NAME = "checkpoint.safetensors"
 """Name of the checkpoint in a run folder."""

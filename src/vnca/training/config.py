@@ -1,14 +1,16 @@
-"""What training takes whatever it trains on: the hyperparameters that all trainings share."""
+"""Every hyperparameter of training: those that all trainings share, of smoke, of textures."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from math import inf
+from typing import Literal
 
 from vnca.core.errors import OptionError
-from vnca.engine.session import Compute
+from vnca.engine import Compute
+from vnca.losses import MotionConfig
 from vnca.losses.appearance import AppearanceConfig
-from vnca.rule.decoder import Decoder
-from vnca.rule.rule import RuleConfig
+from vnca.painting.block import LARGEST, SMALLEST
+from vnca.rule import Decoder, RuleConfig
 
 
 @dataclass(frozen=True)
@@ -124,3 +126,170 @@ class TrainingConfig(ABC):
         ramp = min(1.0, (iteration + 1) / (self.rate_warmup + 1))
         passed = sum(iteration >= round(part * self.iterations) for part in self.milestones)
         return self.learning_rate * ramp * self.decay**passed
+
+
+@dataclass(frozen=True)
+class ViewConfig:
+    """How the smoke is looked at while training."""
+
+    size: int = 128
+    """Rows and columns of a view, pixels."""
+    pixels_per_cell: float | None = None
+    """Pixels that show a cell: a view then shows a part of the smoke, from as near as that takes;
+    all of the smoke unless given."""
+    supersampling: int = 2
+    """Rays along the rows and the columns of a pixel, where a decoder draws what is finer than
+    pixels."""
+    azimuths: tuple[float, ...] = ()
+    """Views come from these degrees around the smoke; from all around unless given."""
+    elevation: float = 30.0
+    """Views come from up to this many degrees above or below the horizon."""
+    step: float = 1.0
+    """Distance between samples along a ray, cells."""
+    mode: Literal["emission-absorption", "paper"] = "emission-absorption"
+    """Integrand: emission and absorption, or the paper's as printed."""
+    cell_opacity: float = 0.95
+    """Without a given gamma, one is chosen that makes a typical cell this opaque: high shows the
+    texture of the surface, low mixes many cells along a ray. For the paper's integrand it is chosen
+    so that typical smoke is as bright as its colour."""
+    gamma: float | None = None
+    """Extinction of density 1, per cell; chosen from the frame unless given."""
+
+    def __post_init__(self) -> None:
+        if self.size < 32:
+            raise OptionError(f"`view.size` {self.size}: at least 32 pixels are needed")
+        if self.pixels_per_cell is not None and not 0 < self.pixels_per_cell <= 64:
+            raise OptionError(
+                f"`view.pixels_per_cell` {self.pixels_per_cell:g}: must be above 0, at most 64"
+            )
+        if not 1 <= self.supersampling <= 8:
+            raise OptionError(f"`view.supersampling` {self.supersampling}: must be from 1 to 8")
+        if not all(-360 <= azimuth <= 360 for azimuth in self.azimuths):
+            raise OptionError(
+                f"`view.azimuths` {' '.join(map(str, self.azimuths))}: must be -360 to 360 degrees"
+            )
+        if not 0 <= self.elevation <= 90:
+            raise OptionError(f"`view.elevation` {self.elevation}: must be 0 to 90 degrees")
+        if not 0 < self.step < inf:
+            raise OptionError(f"`view.step` {self.step}: must be positive")
+        if not 0 < self.cell_opacity < 1:
+            raise OptionError(f"`view.cell_opacity` {self.cell_opacity}: must be between 0 and 1")
+        if self.gamma is not None and not 0 < self.gamma < inf:
+            raise OptionError(f"`view.gamma` {self.gamma}: must be positive")
+
+
+@dataclass(frozen=True)
+class SmokeConfig(TrainingConfig):
+    """How a rule is trained on smoke."""
+
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    """What the seen motion is compared with."""
+    view: ViewConfig = field(default_factory=ViewConfig)
+    """How the smoke is looked at."""
+    texture: float = 0.0
+    """Iterations on a solid texture of the picture for each one on the smoke, made before those:
+    patterns come from there. 0 begins with nothing."""
+    augment: bool = False
+    """Condition each state of the pool on another speed and density of the smoke, and for every
+    other turn the velocity and add one that all cells share: the rule learns from one frame to
+    paint smoke that moves otherwise."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.texture <= 1000:
+            raise OptionError(f"`texture` {self.texture:g}: must be from 0 to 1000")
+
+    @property
+    def pictures(self) -> Pictures:
+        """A view in each iteration."""
+        return Pictures("view.size", self.view.size, 1)
+
+
+@dataclass(frozen=True)
+class SliceConfig:
+    """How the block is looked at while training."""
+
+    size: int = 128
+    """Rows and columns of a slice, pixels."""
+    pixels_per_cell: float = 4.0
+    """Pixels that show a cell, but for the zoom."""
+    supersampling: int = 2
+    """Samples along the rows and the columns of a pixel: what is finer than pixels is averaged
+    instead of becoming grain."""
+    count: int = 1
+    """Slices in an iteration."""
+    oblique: float = 0.5
+    """Share of the slices that lie at any angle; the others lie along the axes."""
+    zoom: float = 1.1
+    """A slice shows from 1/zoom to zoom times as much."""
+    mesh: float = 0.5
+    """Share of the pictures that show the mesh, where there is one."""
+
+    def __post_init__(self) -> None:
+        if self.size < 32:
+            raise OptionError(f"`slice.size` {self.size}: at least 32 pixels are needed")
+        if not 0 < self.pixels_per_cell <= 64:
+            raise OptionError(
+                f"`slice.pixels_per_cell` {self.pixels_per_cell:g}: must be above 0, at most 64"
+            )
+        if not 1 <= self.supersampling <= 8:
+            raise OptionError(f"`slice.supersampling` {self.supersampling}: must be from 1 to 8")
+        if self.count < 1:
+            raise OptionError(f"`slice.count` {self.count}: at least 1 is needed")
+        for name in ("oblique", "mesh"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise OptionError(f"`slice.{name}` {getattr(self, name)}: must be from 0 to 1")
+        if not 1 <= self.zoom <= 4:
+            raise OptionError(f"`slice.zoom` {self.zoom}: must be from 1 to 4")
+
+    @property
+    def cells(self) -> float:
+        """Along the side of a slice."""
+        return self.size / self.pixels_per_cell
+
+
+# A texture is the same everywhere and follows nothing. Only gradients tell a cell where in a
+# pattern it is: they are perceived four times as strongly as in smoke.
+_PLAIN = RuleConfig(
+    sobel_divisor=8, position_prior=False, density_prior=False, velocity_prior=False
+)
+# No density is to be shaped by a picture in grey.
+_COLOURS = AppearanceConfig(grey=False, samples=512)
+
+
+@dataclass(frozen=True)
+class TextureConfig(TrainingConfig):
+    """How a rule for a solid texture is trained."""
+
+    rule: RuleConfig = _PLAIN
+    """The shape of the rule."""
+    appearance: AppearanceConfig = _COLOURS
+    """What is compared with the picture."""
+    pool: PoolConfig = field(default_factory=lambda: PoolConfig(size=16))
+    """The states that rollouts start from."""
+    iterations: int = 1500
+    """Iterations of training: patterns come late, colours early."""
+    learning_rate: float = 2e-3
+    """Adam's learning rate at its highest. Nothing from outside holds a texture's states: at the
+    rates that suit smoke, many explode."""
+    slice: SliceConfig = field(default_factory=SliceConfig)
+    """How the block is looked at."""
+    block: int = 32
+    """Cells along an edge of the block that is trained on; patterns are smaller than it."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        rule = self.rule
+        if rule.position_prior or rule.density_prior or rule.velocity_prior:
+            raise OptionError(
+                "`position_prior`, `density_prior`, `velocity_prior`: a solid texture has none"
+            )
+        if self.appearance.shows_density:
+            raise OptionError("`appearance.grey_source` density: a solid texture has no density")
+        if not SMALLEST <= self.block <= LARGEST:
+            raise OptionError(f"`block` {self.block}: must be from {SMALLEST} to {LARGEST} cells")
+
+    @property
+    def pictures(self) -> Pictures:
+        """Slices, or views of the mesh."""
+        return Pictures("slice.size", self.slice.size, self.slice.count)

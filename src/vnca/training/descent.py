@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import torch
 from torch import Tensor
 
-from vnca.training.snapshot import Snapshot, count, matched
+from vnca.training import Snapshot, count, matched
 
 PATIENCE = 20
 """So many exploded states in a row are the rule's fault. In training that goes well there are two

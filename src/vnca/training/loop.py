@@ -11,22 +11,19 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from vnca.core import FloatArray
 from vnca.core.errors import DivergenceError
-from vnca.core.typing import FloatArray
+from vnca.engine import Compute, open_session
+from vnca.engine.automaton import DecoderWeights as Decoded
 from vnca.engine.automaton import Weights
-from vnca.engine.decode_weights import Weights as Decoded
-from vnca.engine.session import Compute, open_session
-from vnca.features.network import FeatureNetwork
+from vnca.features import FeatureNetwork
 from vnca.losses.appearance import AppearanceLoss
-from vnca.rule.decoder import Decoder
-from vnca.rule.rule import DENSITY_CHANGE, Rule
+from vnca.rule import DENSITY_CHANGE, Decoder, Rule
+from vnca.training import Snapshot, count
 from vnca.training.config import TrainingConfig
 from vnca.training.descent import MOST_ROLLBACKS, Descent
-from vnca.training.memory import states_to_keep
-from vnca.training.pool import Pool
-from vnca.training.rollout import roll_out
-from vnca.training.scene import Scene
-from vnca.training.snapshot import Snapshot, count
+from vnca.training.rollout import Pool, roll_out, states_to_keep
+from vnca.training.scenes import Scene
 from vnca.training.terms import AppearanceTerm, Iteration, OverflowTerm, Term
 
 

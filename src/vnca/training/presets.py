@@ -12,9 +12,7 @@ from typing import Any, TypeVar
 from vnca.core.errors import FileFormatError, OptionError
 from vnca.core.files import existing_file
 from vnca.core.records import field_texts, with_values
-from vnca.training.config import TrainingConfig
-from vnca.training.smoke_config import SmokeConfig
-from vnca.training.texture_config import TextureConfig
+from vnca.training.config import SmokeConfig, TextureConfig, TrainingConfig
 
 if sys.version_info >= (3, 11):
     import tomllib

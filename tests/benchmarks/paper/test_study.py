@@ -8,8 +8,8 @@ from study import REFERENCE, Findings, Study, table
 
 from vnca.core.errors import FileFormatError, OptionError
 from vnca.recipe.smoke import SmokeRun
+from vnca.rule import Rule, Scales
 from vnca.rule.model import MODEL_NAME, Model
-from vnca.rule.rule import Rule, Scales
 from vnca.training.checkpoint import CHECKPOINT_NAME
 
 Make = Callable[..., Study]

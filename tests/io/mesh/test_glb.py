@@ -17,8 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vnca.core.errors import BackendUnavailableError, FileFormatError, VncaError
-from vnca.io.mesh import read_mesh
-from vnca.io.mesh.draco import EXTENSION
+from vnca.io.mesh import EXTENSION, read_mesh
 from vnca.io.mesh.glb import Glb
 
 NAME = Path("some.glb")

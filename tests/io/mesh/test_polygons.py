@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vnca.core import AnyArray
 from vnca.core.errors import BackendUnavailableError
-from vnca.core.typing import AnyArray
-from vnca.io.mesh.polygons import triangulated
+from vnca.io.mesh.obj_ply import triangulated
 
 DART = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.5, 0], [0, 2, 0.0]])
 """A square of area 4 with a notch of area 1.5 in its upper side."""

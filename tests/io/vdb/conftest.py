@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vnca.core.typing import Box
+from vnca.core import Box
 from vnca.io.vdb import VALUE_TYPES, Grid, Metadata, Tiles, Transform
 
 HERE = Path(__file__).parent

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vnca.core import Box
 from vnca.core.errors import GridError
-from vnca.core.typing import Box
 from vnca.io.vdb import Grid, Transform
 
 UNIT = Transform.uniform(1.0)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from vnca.core import Box
 from vnca.core.errors import FileFormatError, GridError
-from vnca.core.typing import Box
 from vnca.io.vdb import Grid, open_vdb, write_vdb
 
 Builder = Callable[..., Grid]

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from vnca.core.errors import GridError
+from vnca.io import SmokeFormat, read_smoke
+from vnca.io import vdb as write
 from vnca.io.provenance import Provenance
-from vnca.io.smoke import SmokeFormat, read_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
-from vnca.io.vdb import file as write
 from vnca.io.vdb.compression import Codec
 from vnca.io.vdb.layout import Compression, NodeCode
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vnca.core import AnyArray
 from vnca.core.lattice import Lattice
-from vnca.core.typing import AnyArray
 from vnca.core.volume import Volume
-from vnca.io.smoke import SmokeFormat, read_smoke, write_painted
+from vnca.io import SmokeFormat, read_smoke, write_painted
 from vnca.io.smoke_format import on_lattice
 
 Judge = Callable[[list[Path]], list[list[dict[str, Any]]]]

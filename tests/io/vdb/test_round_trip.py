@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.core.typing import AnyArray
+from vnca.core import AnyArray
 from vnca.io.vdb import VALUE_TYPES, Grid, Metadata, Tiles, Transform, Tree, open_vdb, write_vdb
 from vnca.io.vdb.layout import LEAF_CELLS, LEAF_EDGE, LOWER_EDGE, UPPER_EDGE, ValueType
 from vnca.io.vdb.metadata import STATISTICS

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 import torch
 
+from vnca.core import Box
 from vnca.core.errors import GridError
-from vnca.core.typing import Box
 from vnca.core.volume import Volume
+from vnca.rule import Rule, RuleConfig, Scales, density_scale
 from vnca.rule.conditioning import normalised_velocity
-from vnca.rule.rule import Rule, RuleConfig, Scales, density_scale
+from vnca.training.config import SmokeConfig, ViewConfig
 from vnca.training.scenes.smoke import (
     DENSEST,
     SPEEDS,
@@ -19,8 +20,7 @@ from vnca.training.scenes.smoke import (
     velocity_scale,
     view_width,
 )
-from vnca.training.smoke_config import SmokeConfig, ViewConfig
-from vnca.training.smoke_trainer import choose_scales
+from vnca.training.trainers import choose_scales
 
 MOVING = Rule.initial(RuleConfig(channels=4, hidden=2), Scales(velocity=2.0), seed=0)
 

@@ -1,6 +1,6 @@
 from collections.abc import Sequence
 
-from vnca.core.typing import FloatArray, IntArray
+from vnca.core import FloatArray, IntArray
 
 def instructions(bfloat16: bool, /) -> list[str]: ...
 def changing_rows(hashes: IntArray, key: int, threshold: int, rows: IntArray, /) -> int: ...

@@ -3,7 +3,7 @@
 import importlib.util
 from typing import Any
 
-from vnca.engine.session import Backend, Compute, Job, Session
+from vnca.engine import Backend, Compute, Job, Session
 
 
 class ReferenceBackend(Backend):
@@ -25,7 +25,7 @@ class ReferenceBackend(Backend):
 
     def update(self, *, threads: int | None = None, precision: str = "float32") -> Any:
         """See `Backend.update`."""
-        from vnca.engine.reference.step import update
+        from vnca.engine.reference.equations import update
 
         return update
 

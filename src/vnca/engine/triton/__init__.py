@@ -3,7 +3,7 @@
 import importlib.util
 from typing import Any
 
-from vnca.engine.session import Backend, Compute, Job, Session
+from vnca.engine import Backend, Compute, Job, Session
 
 
 class TritonBackend(Backend):

@@ -8,7 +8,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from vnca.core.errors import ShapeError
-from vnca.engine.decode_weights import CORNERS, OUTPUTS, Weights
+from vnca.engine.automaton import CORNERS, OUTPUTS, DecoderWeights
 from vnca.engine.triton.step import (
     LARGEST,
     OPTIONS,
@@ -37,11 +37,11 @@ def decode(
     state: Tensor,
     rows: Tensor,
     fractions: Tensor,
-    weights: Weights,
+    weights: DecoderWeights,
     *,
     precision: Precision | None = None,
 ) -> Tensor:
-    """What is seen at points, as `vnca.engine.reference.decode.decode` has it.
+    """What is seen at points, as `vnca.engine.reference.equations.decode` has it.
 
     Differentiable, once, in the state and the weights. The backward pass computes the hidden layers
     anew, and keeps C floats and 8 integers a point. The same bits in every run on one kind of GPU.
@@ -148,7 +148,7 @@ def _sizes(tensors: Sequence[Tensor], tile: int) -> dict[str, int]:
     }
 
 
-def _check(state: Tensor, rows: Tensor, fractions: Tensor, weights: Weights) -> None:
+def _check(state: Tensor, rows: Tensor, fractions: Tensor, weights: DecoderWeights) -> None:
     """Everything but the values of rows, which the CPU does not know."""
     n, c = state.shape if state.ndim == 2 else (0, 0)
     m, units = (t.shape[0] if t.ndim else 0 for t in (fractions, weights.first))
@@ -157,7 +157,7 @@ def _check(state: Tensor, rows: Tensor, fractions: Tensor, weights: Weights) -> 
         "rows": (rows, (CORNERS, m)),
         "fractions": (fractions, (m, 3)),
     }
-    named = zip(Weights._fields, weights, Weights.shapes(c, units), strict=True)
+    named = zip(DecoderWeights._fields, weights, DecoderWeights.shapes(c, units), strict=True)
     shapes |= {name.replace("_", " "): (weight, shape) for name, weight, shape in named}
     require_layout("decoding", shapes, ("rows",))
     if not (OUTPUTS <= c <= MOST_CHANNELS and 1 <= units <= MOST_UNITS and n >= 1):

@@ -12,7 +12,7 @@ from torch.utils.weak import WeakTensorKeyDictionary
 from vnca.core.errors import ShapeError
 from vnca.engine.automaton import FILTERS, NEIGHBOURS
 from vnca.engine.automaton import stencil as filters
-from vnca.engine.reference.step import Weights
+from vnca.engine.reference.equations import Weights
 
 try:
     import triton
@@ -122,7 +122,7 @@ def update(
     *,
     precision: Precision | None = None,
 ) -> Tensor:
-    """The state after one step, as `vnca.engine.reference.step.update` has it.
+    """The state after one step, as `vnca.engine.reference.equations.update` has it.
 
     Differentiable, once, in the state and the weights. Beyond the two states, memory is kept for
     nothing: the backward pass computes the hidden layer anew. The same bits in every run on one

@@ -1,7 +1,10 @@
 """Triangle meshes: what there is to texture in a file.
 
 Every mesh is a GLB document, OBJ, PLY and STL after a conversion. So all that a GLB file holds
-stays in it: nodes, materials, animations, further UV sets.
+stays in it: nodes, materials, animations, further UV sets. Meshes that Draco compressed are made
+plain.
+
+Reference: Khronos, glTF extension KHR_draco_mesh_compression.
 """
 
 from collections.abc import Iterator
@@ -14,6 +17,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from vnca.core import AnyArray
 from vnca.core.errors import (
     BackendUnavailableError,
     FileFormatError,
@@ -22,13 +26,77 @@ from vnca.core.errors import (
     VncaError,
 )
 from vnca.core.files import existing_file
-from vnca.core.typing import AnyArray
-from vnca.io.mesh.draco import decompress
 from vnca.io.mesh.entries import numbers
 from vnca.io.mesh.glb import DAMAGE, Glb
 from vnca.io.mesh.obj_ply import PlyMesh, parse_ply, plain_obj
 from vnca.io.picture import FORMATS
 from vnca.io.smoke_format import UpAxis
+
+EXTENSION = "KHR_draco_mesh_compression"
+
+
+def decompress(glb: Glb) -> None:
+    """Put plain vertices and faces in place of compressed ones, in a document.
+
+    Where the file holds plain ones too, those are kept.
+
+    Raises:
+        FileFormatError: If what is compressed cannot be read.
+        BackendUnavailableError: If DracoPy is needed and not installed.
+    """
+    try:
+        for mesh in glb.document.get("meshes", []):
+            for primitive in mesh["primitives"]:
+                compressed = primitive.get("extensions", {}).pop(EXTENSION, None)
+                if compressed is None:
+                    continue
+                stored = [primitive["attributes"][name] for name in compressed["attributes"]]
+                if not all("bufferView" in glb.item("accessors", each) for each in stored):
+                    _decompress(glb, primitive, compressed)
+                if not primitive["extensions"]:
+                    del primitive["extensions"]
+        glb.drop_extension(EXTENSION)
+    except DAMAGE as error:
+        raise FileFormatError(
+            f"{glb.path}: damaged, its meshes cannot be decompressed ({error})"
+        ) from error
+
+
+def _decompress(glb: Glb, primitive: dict[str, Any], compressed: dict[str, Any]) -> None:
+    decoded = _decoded(glb, compressed["bufferView"])
+    stored = {each["unique_id"]: each["data"] for each in decoded.attributes}
+    attributes = primitive["attributes"]
+    for name, number in compressed["attributes"].items():
+        like = attributes[name]
+        values = np.asarray(stored[number])
+        if len(values) != glb.item("accessors", like)["count"]:
+            raise ValueError("another number of vertices than it says")
+        attributes[name] = glb.add_array(
+            values.astype(glb.type_of(like)), like, bounds=name == "POSITION"
+        )
+    faces = np.asarray(decoded.faces, np.uint32)
+    if faces.size and faces.max() >= len(decoded.points):
+        raise ValueError("a face has a vertex that is not there")
+    primitive["indices"] = glb.add_array(faces.reshape(-1, 1))
+    primitive.pop("mode", None)  # They are triangles, as where none is named.
+
+
+def _decoded(glb: Glb, view: int) -> Any:
+    try:
+        import DracoPy
+    except ImportError as error:
+        raise BackendUnavailableError(
+            f"{glb.path}: its meshes are compressed ({EXTENSION}), which needs DracoPy: "
+            "pip install 'vnca[texture]'; or export it without"
+        ) from error
+    try:
+        mesh = DracoPy.decode(glb.bytes_of(view))
+    except DracoPy.FileTypeException as error:
+        raise ValueError(str(error)) from error
+    if not isinstance(mesh, DracoPy.DracoMesh):
+        raise ValueError("points without faces")
+    return mesh
+
 
 SUFFIXES = (".glb", ".obj", ".ply", ".stl")
 """What `read_mesh` reads."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vnca.core.typing import AnyArray
+from vnca.core import AnyArray
 
 
 def numbers(entry: dict[str, Any], name: str, default: tuple[float, ...]) -> AnyArray:

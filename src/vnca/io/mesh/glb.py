@@ -16,9 +16,9 @@ from urllib.parse import unquote_to_bytes
 
 import numpy as np
 
+from vnca.core import AnyArray
 from vnca.core.errors import FileFormatError
 from vnca.core.files import existing_file, whole_file
-from vnca.core.typing import AnyArray
 from vnca.io.mesh.entries import whole
 
 _MAGIC, _VERSION = 0x46546C67, 2

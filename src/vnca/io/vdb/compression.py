@@ -14,8 +14,8 @@ import blosc
 import blosc.blosc_extension
 import numpy as np
 
+from vnca.core import AnyArray, BoolArray
 from vnca.core.errors import GridError
-from vnca.core.typing import AnyArray, BoolArray
 from vnca.io.vdb.layout import Compression, Cursor, NodeCode, ValueType, bits_of
 
 _BLOSC_HEADER = struct.Struct("<4B3I")  # versions, flags, type size; bytes, block, packed bytes

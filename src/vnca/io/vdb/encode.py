@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vnca.core import AnyArray, BoolArray
 from vnca.core.errors import GridError
-from vnca.core.typing import AnyArray, BoolArray
 from vnca.io.vdb.compression import Codec
 from vnca.io.vdb.grid import Grid
 from vnca.io.vdb.layout import (

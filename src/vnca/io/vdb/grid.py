@@ -6,10 +6,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from vnca.core import AnyArray, BoolArray, Box, Index, IntArray
 from vnca.core.bricks import covered
 from vnca.core.errors import GridError
 from vnca.core.field import Field, as_bricks
-from vnca.core.typing import AnyArray, BoolArray, Box, Index, IntArray
 from vnca.io.vdb.layout import LEAF_CELLS, LEAF_EDGE, VALUE_TYPES, ValueType
 from vnca.io.vdb.metadata import NAMES_OF_TYPES, Metadata, Transform
 from vnca.io.vdb.tree import Tiles, Tree

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO
 
+from vnca.core import Box
 from vnca.core.errors import GridError
-from vnca.core.typing import Box
 from vnca.io.vdb.grid import EMPTY_BOX, Grid
 from vnca.io.vdb.layout import (
     HALF_SUFFIX,

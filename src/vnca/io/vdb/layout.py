@@ -11,8 +11,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from vnca.core import AnyArray, IntArray
 from vnca.core.errors import FileFormatError
-from vnca.core.typing import AnyArray, IntArray
 
 MAGIC = 0x56444220
 OLDEST_VERSION, NEWEST_VERSION = 222, 225

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from vnca.core import AnyArray
 from vnca.core.errors import GridError, OptionError
-from vnca.core.typing import AnyArray
 from vnca.io.vdb.layout import Cursor, encode_string
 
 _LAYOUTS = {

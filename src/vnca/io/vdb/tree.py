@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vnca.core.typing import AnyArray, BoolArray, IntArray
+from vnca.core import AnyArray, BoolArray, IntArray
 from vnca.io.vdb.compression import Codec, read_value
 from vnca.io.vdb.layout import (
     LEAF_CELLS,

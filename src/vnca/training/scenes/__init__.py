@@ -1,1 +1,160 @@
-"""What a rule is trained on: smoke, or a block of solid texture."""
+"""What a rule is trained on: cells, and how the colours they take are looked at."""
+
+from abc import ABC, abstractmethod
+from typing import Generic, TypeVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from vnca.core import FloatArray
+from vnca.engine import torch_decode
+from vnca.engine.automaton import DecoderWeights
+from vnca.engine.domain import Domain
+from vnca.rendering.colour import srgb_to_linear
+from vnca.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, Decoder
+
+Viewpoint = TypeVar("Viewpoint")
+"""Where a scene is looked at from, to look at several states alike."""
+
+
+class Scene(ABC, Generic[Viewpoint]):
+    """Cells on which states are rolled out and looked at; nothing in it changes.
+
+    Attributes:
+        domain: The cells that live.
+        priors: `[n, P]`, what the rule is conditioned on.
+        decoder: What is seen between cells, tensors that can be trained; None where states are
+            interpolated.
+        samples: About how many are taken along the ray of a pixel.
+        width: Cells across a picture.
+        paints_density: Whether a rule may change the density. If not, its weights that would do
+            so are never trained.
+    """
+
+    samples = 1.0
+    paints_density = True
+
+    def __init__(
+        self,
+        domain: Domain,
+        priors: FloatArray,
+        device: torch.device | str,
+        *,
+        width: float,
+        decoder: Decoder | None = None,
+        backend: str = "auto",
+    ) -> None:
+        """Put the cells, their priors `[n, P]` and the decoder on the device.
+
+        Args:
+            domain: The active cells.
+            priors: `[n, P]`.
+            device: Where rollouts and pictures are computed.
+            width: Cells across a picture.
+            decoder: What is seen between cells; states are interpolated unless given.
+            backend: What decodes.
+        """
+        self.domain, self.width = domain, width
+        self.priors = torch.from_numpy(priors).to(device)
+        self._places = torch.from_numpy(domain.places).to(device)
+        self.decoder: DecoderWeights | None = None
+        if decoder is not None:
+            self.decoder = DecoderWeights(
+                *(torch.tensor(w, device=device) for w in decoder.weights)
+            )
+            self._decode = torch_decode(backend, device=self.priors.device.type)
+            self._rows, self._beside = _table(domain, device)
+
+    def seed(self, channels: int) -> Tensor:
+        """The state every rollout starts from, zeros `[n + 1, channels]`."""
+        return torch.from_numpy(self.domain.seed(channels)).to(self.priors.device)
+
+    def dense(self, values: Tensor) -> Tensor:
+        """Values of the cells `[n, ...]` over their box `[x, y, z, ...]`; differentiable."""
+        shape = self.domain.box.shape
+        field = values.new_zeros(int(np.prod(shape)), *values.shape[1:])
+        return field.index_copy(0, self._places, values).view(*shape, *values.shape[1:])
+
+    def seen(self, state: Tensor, points: Tensor) -> Tensor:
+        """What a state shows between its cells, `[m, 4]`: sRGB minus one half, and Δd.
+
+        Differentiable in the state and the decoder, which there must be.
+
+        Args:
+            state: `[n + 1, C]`.
+            points: `[m, 3]` in the box; its first cell is at (0, 0, 0).
+        """
+        assert self.decoder is not None
+        if self.domain.border == "circular":
+            size = points.new_tensor(self.domain.box.shape)
+            points = points.remainder(size)
+            points = torch.where(points < size, points, 0)  # just below zero rounds to the size
+        first = points.floor()
+        shape = self._rows.shape
+        # The table begins a cell before the box.
+        strides = first.new_tensor([shape[1] * shape[2], shape[2], 1]).long()
+        lowest = ((first.long() + 1) * strides).sum(-1)
+        rows = self._rows.view(-1)[lowest + self._beside]
+        return self._decode(state, rows, points - first, self.decoder)
+
+    def augmented(self, number: int) -> "Scene[Viewpoint]":
+        """A scene of the same cells that a state of the pool leads its life in, by a number."""
+        del number
+        return self
+
+    @abstractmethod
+    def viewpoint(self, random: np.random.Generator) -> Viewpoint:
+        """Where to look from in an iteration, drawn at random."""
+
+    @abstractmethod
+    def pictures(
+        self, state: Tensor, viewpoint: Viewpoint, background: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """What a state shows, as the losses want it; differentiable in the state.
+
+        Args:
+            state: `[n + 1, C]`.
+            viewpoint: Where to look from.
+            background: What is behind, linear RGB `[3]`.
+
+        Returns:
+            sRGB `[b, 3, r, c]` over the background, and opacity `[b, r, c]`.
+        """
+
+    def density_pictures(
+        self, state: Tensor, viewpoint: Viewpoint, background: Tensor
+    ) -> Tensor | None:
+        """The density that `pictures` shows coloured, in grey: sRGB `[b, 3, r, c]`.
+
+        Differentiable in the state. None of a scene whose density is not painted.
+        """
+        del state, viewpoint, background
+        return None
+
+    @abstractmethod
+    def preview_views(self, state: Tensor, size: int) -> list[FloatArray]:
+        """Pictures for people to look at, linear RGB `[size, size, 3]`, from where they expect."""
+
+
+def _table(domain: Domain, device: torch.device | str) -> tuple[Tensor, Tensor]:
+    """Rows of the state over the box and a cell beyond; and how far apart a point's corners are.
+
+    Returns:
+        `[x + 2, y + 2, z + 2]`, n where nothing lives; and `[8, 1]` places in it, laid out flat.
+    """
+    rows = np.full(domain.box.shape, len(domain), np.int32)
+    rows.reshape(-1)[domain.places] = np.arange(len(domain), dtype=np.int32)
+    rows = np.pad(rows, 1, mode="wrap" if domain.border == "circular" else "edge")
+    corners = np.ravel_multi_index(tuple(np.indices((2, 2, 2)).reshape(3, 8)), rows.shape)
+    return torch.from_numpy(rows).to(device), torch.from_numpy(corners)[:, None].to(device)
+
+
+def colours(seen: Tensor) -> Tensor:
+    """Linear RGB `[..., 3]` of states, or of what is seen of them, `[..., C]`; differentiable."""
+    return srgb_to_linear((seen[..., COLOUR] + 0.5).clamp(0, 1))
+
+
+def density_factors(seen: Tensor) -> Tensor:
+    """1 + Δd `[...]` of states, or of what is seen of them, `[..., C]`; differentiable."""
+    return 1 + seen[..., DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)

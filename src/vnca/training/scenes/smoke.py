@@ -11,21 +11,19 @@ import torch
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
+from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.camera import Camera, Orthographic, Perspective, frame_box, turntable, world_box
 from vnca.core.errors import GridError
-from vnca.core.typing import AnyArray, Box, FloatArray
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
-from vnca.losses.terms import luma
-from vnca.rendering.brightness import gamma_for_own_colour
+from vnca.losses import luma
+from vnca.rendering import Shader, View, projected_velocity, render
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
-from vnca.rendering.velocity import projected_velocity
-from vnca.rendering.view import Shader, View, render
+from vnca.rule import SMOKE_THRESHOLD, Rule, gamma_for_own_colour
 from vnca.rule.conditioning import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
 from vnca.rule.conditioning import normalised_velocity, priors
-from vnca.rule.rule import SMOKE_THRESHOLD, Rule
-from vnca.training.scene import Scene, colours, density_factors
-from vnca.training.smoke_config import ViewConfig
+from vnca.training.config import ViewConfig
+from vnca.training.scenes import Scene, colours, density_factors
 
 SPEEDS = (0.25, 1.5)
 """How much slower or faster than in the frame augmented smoke moves, at most."""
@@ -267,7 +265,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
         return 1 if self.decoder is None else self.view.supersampling
 
     def _coloured(self, state: Tensor, *, white: bool = False) -> tuple[Tensor, Tensor | Shader]:
-        """Density and colour as `vnca.rendering.view.render` takes them."""
+        """Density and colour as `vnca.rendering.render` takes them."""
         if self.decoder is not None:
             return self.dense(self._density), partial(self._shade, state, white=white)
         density = self._painted_density(state)
@@ -278,7 +276,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
     def _shade(
         self, state: Tensor, points: Tensor, *, white: bool = False
     ) -> tuple[Tensor, Tensor]:
-        """What a decoded state shows at points `[m, 3]`, as `vnca.rendering.view.Shader` has it."""
+        """What a decoded state shows at points `[m, 3]`, as `vnca.rendering.Shader` has it."""
         seen = self.seen(state, points)
         hues = seen.new_ones(len(seen), 3) if white else colours(seen)
         return density_factors(seen), hues

@@ -1,0 +1,115 @@
+"""The frames of a sequence on their way to a rule: read ahead, and looked at.
+
+Of smoke without velocity the user is told once; smoke too thin to be painted is refused, as with
+densities in another unit than the rule was taught in.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from vnca.core import FloatArray
+from vnca.core.errors import SequenceError
+from vnca.core.volume import Volume
+from vnca.io import SmokeFormat, missing_velocity
+from vnca.io.smoke_format import NO_VELOCITY
+from vnca.rule import SMOKE_THRESHOLD, Rule, density_scale
+
+T = TypeVar("T")
+
+
+def read_ahead(loads: Iterable[Callable[[], T]]) -> Iterator[T]:
+    """The results of `loads` in order, each computed in a thread one ahead of its use.
+
+    At most two results exist at a time. An exception is raised where its result would have been.
+    """
+    with ThreadPoolExecutor(max_workers=1) as reader:
+        pending = None
+        for load in loads:
+            following = reader.submit(load)
+            if pending is not None:
+                yield pending.result()
+            pending = following
+        if pending is not None:
+            yield pending.result()
+
+
+@dataclass
+class StillSmoke:
+    """Looks for smoke without velocity among what a rule paints.
+
+    Attributes:
+        rule: The rule, which may be conditioned on velocity.
+        format: How files are read: velocity may not be wanted.
+        tell: Is given the line for the user.
+    """
+
+    rule: Rule
+    format: SmokeFormat
+    tell: Callable[[str], None]
+    _is_told: bool = field(default=False, init=False)
+
+    def look(self, smoke: Volume, path: Path | None) -> None:
+        """Tell of a frame, the first without velocity; and what of its file could be that.
+
+        Args:
+            smoke: The frame.
+            path: Its file; None if it has none.
+
+        Raises:
+            FileFormatError: If the file cannot be read any more.
+        """
+        if (
+            self._is_told
+            or not self.rule.config.is_conditioned_on("velocity")
+            or self.format.velocity_grid == NO_VELOCITY
+            or smoke.velocity_field is not None
+            or smoke.box.is_empty
+        ):
+            return
+        self._is_told = True
+        missing = f"frame {smoke.frame}: no velocity" if path is None else missing_velocity(path)
+        self.tell(f"{missing}; frames without are painted as if their smoke rested")
+
+    def watched(self, frames: Iterable[Volume], paths: Iterable[Path | None]) -> Iterator[Volume]:
+        """Frames in order, each looked at.
+
+        Args:
+            frames: The frames.
+            paths: Their files.
+        """
+        for smoke, path in zip(frames, paths, strict=True):
+            self.look(smoke, path)
+            yield smoke
+
+
+def require_dense(densities: Iterable[FloatArray], scale: float, where: str) -> None:
+    """Refuse a sequence of which nothing would be painted.
+
+    Looks at frames up to the first that is dense enough; of none at all nothing is said.
+
+    Args:
+        densities: Of each frame, in any shape.
+        scale: The density that counts as 1.
+        where: What a message calls the sequence.
+
+    Raises:
+        SequenceError: If no frame holds a cell that counts as smoke.
+    """
+    most, typical, is_read = 0.0, 0.0, False
+    for density in densities:
+        is_read = True
+        most = max(most, float(density.max(initial=0)))
+        if most > SMOKE_THRESHOLD * scale:
+            return
+        if density.any():
+            typical = max(typical, density_scale(density))
+    if is_read:
+        raise SequenceError(
+            f"{where}: nothing would be painted, as the greatest density of all frames, "
+            f"{most:.3g}, is below {SMOKE_THRESHOLD:.0%} of the one that counts as 1, "
+            f"{scale:.3g}; "
+            + (f"try `density_scale` {typical:.3g}" if most else "choose others with `frames`")
+        )

@@ -1,1 +1,0 @@
-"""Training of the optical flow network, on synthetic motion; see `docs/flow.md`."""

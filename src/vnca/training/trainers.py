@@ -1,0 +1,128 @@
+"""The trainers: of a frame of smoke and a picture, and of a block of solid texture and one.
+
+Reference: VNCA section 5; slices of a solid as in Kopf et al. 2007.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from vnca.core import AnyArray, FloatArray
+from vnca.core.lattice import Lattice, Region
+from vnca.core.volume import Volume
+from vnca.features import FeatureNetwork
+from vnca.features.flow import FlowNetwork
+from vnca.io.mesh import Mesh
+from vnca.io.smoke_format import on_lattice
+from vnca.rule import Rule, Scales, density_scale, gamma_for_cell_opacity, gamma_for_own_colour
+from vnca.training.config import SmokeConfig, TextureConfig, ViewConfig
+from vnca.training.loop import Trainer
+from vnca.training.scenes.smoke import SmokeScene, velocity_scale
+from vnca.training.scenes.texture import BlockScene
+from vnca.training.terms import MotionSupervision, Term
+
+
+def smoke_trainer(
+    smoke: Volume,
+    style: FloatArray,
+    config: SmokeConfig,
+    network: FeatureNetwork,
+    *,
+    device: torch.device | str = "cpu",
+    memory_budget: int | None = None,
+    terms: Sequence[Term] = (),
+) -> Trainer:
+    """What trains a rule on one frame and one picture.
+
+    Args:
+        smoke: The frame, which is laid on a lattice of its own.
+        style: Linear RGB `[r, c, 3]`.
+        config: The hyperparameters.
+        network: The frozen network that judges pictures.
+        device: Where to compute.
+        memory_budget: Bytes that the program may take; see `Trainer`.
+        terms: Further terms of the loss.
+
+    Raises:
+        GridError: If there is no smoke in the frame, or it can have no place on a lattice.
+        OptionError: If the memory budget is not enough.
+    """
+    what = f"frame {smoke.frame}"
+    smoke = on_lattice(smoke, Lattice.of(smoke.index_to_world, what), what)
+    rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
+    rule = replace(rule, decoder=config.initial_decoder())
+    scene = SmokeScene(
+        smoke, rule, config.view, augment=config.augment, device=device, backend=config.backend
+    )
+    rule = replace(rule, place=Region(Lattice(smoke.index_to_world), scene.domain.box))
+    if config.motion.weight and scene.moves:
+        terms = (MotionSupervision(config.motion, FlowNetwork.load(device)), *terms)
+    return Trainer(scene, rule, style, config, network, terms=terms, memory_budget=memory_budget)
+
+
+def choose_scales(smoke: Volume, config: SmokeConfig) -> Scales:
+    """Normalisers from the frame a rule is trained on."""
+    density = density_scale(smoke.density)
+    return Scales(
+        density=density,
+        velocity=velocity_scale(smoke),
+        gamma=config.view.gamma or _gamma(smoke.density / density, config.view),
+    )
+
+
+def _gamma(density: AnyArray, view: ViewConfig) -> float:
+    """What suits the integrand that training looks with."""
+    if view.mode == "paper":
+        return gamma_for_own_colour(density)
+    return gamma_for_cell_opacity(density, view.cell_opacity)
+
+
+def texture_trainer(
+    style: FloatArray,
+    config: TextureConfig,
+    network: FeatureNetwork,
+    *,
+    mesh: Mesh | None = None,
+    device: torch.device | str = "cpu",
+    memory_budget: int | None = None,
+) -> Trainer:
+    """What trains a rule to grow blocks that look like a picture wherever they are cut.
+
+    Args:
+        style: Linear RGB `[r, c, 3]`.
+        config: The hyperparameters.
+        network: The frozen network that judges pictures.
+        mesh: Looked at beside the slices.
+        device: Where to compute.
+        memory_budget: Bytes that the program may take; see `Trainer`.
+
+    Raises:
+        OptionError: If the memory budget is not enough.
+    """
+    rule = initial_rule(config)
+    scene = BlockScene(
+        config.block,
+        config.slice,
+        conditioning_width=config.rule.conditioning_width,
+        mesh=mesh,
+        decoder=rule.decoder,
+        device=device,
+        backend=config.backend,
+    )
+    return Trainer(scene, rule, style, config, network, memory_budget=memory_budget)
+
+
+def initial_rule(config: TextureConfig) -> Rule:
+    """A rule before training, with random biases.
+
+    Where no prior tells cells anything, a block of zeros is perceived as zeros: without biases
+    the hidden layer would stay silent, and its output weights without a gradient.
+    """
+    rule = Rule.initial(config.rule, Scales(), seed=config.seed)
+    bound = config.rule.inputs**-0.5
+    random = np.random.default_rng(config.seed)
+    bias = random.uniform(-bound, bound, rule.bias.shape).astype(np.float32)
+    return dataclasses.replace(rule, bias=bias, decoder=config.initial_decoder())
