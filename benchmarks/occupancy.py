@@ -57,7 +57,7 @@ def main() -> None:
     for row in run.rows:
         print(
             f"{row['backend']} {row['pass']:8} {row['occupancy']:7.2%} alive: "
-            f"{row['ns_per_cell']:.4g} ns a living cell"
+            f"{row['ns_per_cell']:.4g} ns an active cell"
         )
 
 

@@ -91,7 +91,7 @@ def roofline(rows: Sequence[Row]) -> list[Chart]:
 
 
 def occupancy(rows: Sequence[Row]) -> list[Chart]:
-    """A chart for each device: time of a step against the living cells."""
+    """A chart for each device: time of a step against the active cells."""
     charts = []
     for run in latest(rows, SWEEP_CASE):
         first = run[0]
@@ -138,7 +138,7 @@ def step_table(rows: Sequence[Row]) -> list[str]:
             f"threads, torch {first['torch']}; GEMM {first['gemm_gflops']} GFLOP/s, copy "
             f"{first['copy_gbs']} GB/s ({first['date']})",
             "",
-            "| backend | pass | ns a living cell | of GEMM | of copy | MB | against `plain` |",
+            "| backend | pass | ns an active cell | of GEMM | of copy | MB | against `plain` |",
             "|---|---|---|---|---|---|---|",
         ]
         for row in run:
@@ -218,7 +218,7 @@ def main() -> None:
         read(options.results / f"{name}.csv") for name in ("step", "occupancy", "train", "stylize")
     )
     roofs = drawn("roofline", roofline, step, options.docs, "Rooflines with the backends in them")
-    cost = drawn("occupancy", occupancy, sweep, options.docs, "Time against living cells")
+    cost = drawn("occupancy", occupancy, sweep, options.docs, "Time against active cells")
     spread = ("seconds_min", "seconds", "seconds_max", "peak_mb")
     blocks = {
         "roofline": roofs,

@@ -7,6 +7,7 @@ With the draft's 250 iterations it takes minutes on two cores. For files there i
 """
 
 import sys
+from importlib.resources import as_file, files
 
 import numpy as np
 
@@ -33,23 +34,16 @@ def smoke(number: int, hottest: float) -> vnca.Volume:
     )
 
 
-def stripes(size: int = 128) -> np.ndarray:
-    """A picture, linear RGB `[r, c, 3]` from 0 to 1."""
-    rows, columns = np.mgrid[:size, :size]
-    wave = 0.5 + 0.5 * np.sin(0.3 * (rows + 4 * np.sin(columns / 9)))
-    warm, cold = np.array([0.8, 0.3, 0.05]), np.array([0.02, 0.1, 0.3])
-    return (warm * wave[..., None] + cold * (1 - wave[..., None])).astype(np.float32)
-
-
 def main(iterations: str = "250") -> None:
     """Train on hot smoke, then paint it hot and cold."""
     vnca.register_conditioning(TEMPERATURE)
-    model = vnca.train(
-        smoke(1, hottest=1500.0),
-        stripes(),
-        iterations=int(iterations),
-        rule={"conditioning": ("density", "velocity", "temperature")},
-    )
+    with as_file(files("vnca.data") / "rust.webp") as picture:
+        model = vnca.train(
+            smoke(1, hottest=1500.0),
+            picture,
+            iterations=int(iterations),
+            rule={"conditioning": ("density", "velocity", "temperature")},
+        )
     for hottest in (1500.0, 0.0):
         frames = [smoke(number, hottest) for number in range(1, 4)]
         for frame in vnca.stylize(model, frames):

@@ -116,3 +116,24 @@ def test_a_cheap_command_of_the_documentation_runs(
     model.parent.mkdir(parents=True)
     shutil.copy(MODEL, model)
     assert main(words) == 0
+
+
+WALKS = re.findall(
+    r"^\*([^*\n]+)\.\*.*\n\n((?:\d\. .*\n)+)",
+    (ROOT / "docs" / "design.md").read_text(),
+    re.MULTILINE,
+)
+
+
+def test_there_are_three_walks_through_the_house() -> None:
+    assert [name for name, _ in WALKS] == ["The density of a painted frame", "γ", "The weights"]
+
+
+@pytest.mark.parametrize("steps", [pytest.param(steps, id=name) for name, steps in WALKS])
+def test_a_walk_is_short_and_goes_through_files_that_are_there(steps: str) -> None:
+    numbered = steps.splitlines()
+    assert 1 < len(numbered) <= 8
+    for step in numbered:
+        path = re.match(r"\d\. `([^`]+)`", step)
+        assert path, step
+        assert (ROOT / "src" / "vnca" / path[1]).is_file()

@@ -85,7 +85,7 @@ def test_a_file_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_backend(tiny_smoke: Volume, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = imported(monkeypatch, "src/vnca/engine/double/__init__.py")
+    module = imported(monkeypatch, "src/vnca/engine/double.py")
     name = module.BACKEND.name
     assert f'`"{name}"`' in DESIGN
     monkeypatch.setattr(sessions, "BACKENDS", (*sessions.BACKENDS, name))

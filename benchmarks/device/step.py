@@ -1,7 +1,7 @@
 """One step on a GPU, in all that `vnca bench step` can measure there.
 
 Run `python benchmarks/device/step.py PART --csv FILE`; PART is bench (64³ and 128³ cells, and how
-cost follows the living cells) or large (200×300×200 cells).
+cost follows the active cells) or large (200×300×200 cells).
 """
 
 import argparse

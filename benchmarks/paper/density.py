@@ -23,7 +23,7 @@ class Density(Study):
     """On what the study is made."""
 
     domain: DomainKind | None = None
-    """Where cells live: within reach of the smoke (active), whose surface tells them where it is,
+    """Which cells are active: those near the smoke (active), whose surface tells them where it is,
     or in all of its box as in the paper; as the preset has it unless given."""
     velocity: bool = True
     """Whether cells are told the velocity, by which they can tell where smoke is, too."""

@@ -30,7 +30,7 @@ SIDES: Mapping[str, Viewpoint] = dict(
     zip(("front", "right", "back", "above"), PREVIEW_VIEWS, strict=True)
 )
 """Views by name; a training of a single view has only the front."""
-PORTRAIT_SIZE = 192
+PREVIEW_SIZE = 192
 """Rows and columns of a picture on a sheet, pixels."""
 PAINTED = StylizeConfig()
 UNPAINTED = StylizeConfig(warmup=0, steps_per_frame=0, strength=0.0, density_strength=0.0)
@@ -136,7 +136,7 @@ class Judge:
         mode = mode or self.view.mode
         step = PREVIEW_STEP if mode == "emission-absorption" else self.view.step
         view = self.look(
-            painting, rule, viewpoint, size=PORTRAIT_SIZE, step=step, gamma=gamma, mode=mode
+            painting, rule, viewpoint, size=PREVIEW_SIZE, step=step, gamma=gamma, mode=mode
         )
         return view.over([PREVIEW_BACKGROUND] * 3).clamp(0, 1).cpu().numpy()
 
@@ -148,7 +148,7 @@ class Judge:
 
     def sheet(self, rows: Mapping[str, Mapping[str, FloatArray]]) -> FloatArray:
         """Rows of pictures after the style, each with the names of its row and its own."""
-        head = np.clip(fit(self.style, PORTRAIT_SIZE, PORTRAIT_SIZE), 0, 1)
+        head = np.clip(fit(self.style, PREVIEW_SIZE, PREVIEW_SIZE), 0, 1)
         heads = [head, *[None] * (len(rows) - 1)]
         pictures = [[first, *row.values()] for first, row in zip(heads, rows.values(), strict=True)]
         captions = [["", *(f"{name}, {each}" for each in row)] for name, row in rows.items()]

@@ -1,9 +1,20 @@
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pytest
+
+from vnca.core.errors import ModelError
+from vnca.core.volume import Volume
+from vnca.engine.domain import Domain
 from vnca.io.vdb import write_vdb
-from vnca.rule.model import MODEL_NAME
+from vnca.rule import Rule
+from vnca.rule import conditioning as inputs
+from vnca.rule.conditioning import Conditioning, register_conditioning
+from vnca.rule.model import MODEL_NAME, Model
 
 Vnca = Callable[..., Any]
 
@@ -70,3 +81,36 @@ def test_a_model_and_its_run_are_described_alike(vnca: Vnca, model: Path) -> Non
     assert "priors off  position" in run.out
     assert "gamma 0.7" in run.out
     assert '"night.png"' in run.out
+    assert "conditioned" not in run.out
+
+
+def test_what_a_model_is_conditioned_on_is_told_also_where_it_is_not_known(
+    vnca: Vnca, model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(inputs, "_KNOWN", dict(inputs._KNOWN))
+        register_conditioning(Conditioning.of_field("temperature", scale=1500))
+        register_conditioning(Conditioning("slope", 3, lambda *_: np.zeros((0, 3), np.float32)))
+        rule = Model.load(model).rule
+        names = ("density", "temperature", "slope")
+        config = replace(rule.config, conditioning=names)
+        own = tmp_path / "own.safetensors"
+        Model(Rule.initial(config, rule.scales, seed=1)).save(own)
+    monkeypatch.setattr(inputs, "_KNOWN", dict(inputs._KNOWN))
+    lines = vnca("info", own).out.splitlines()
+    assert (
+        "  conditioned on temperature: 1 number a cell, the grid of that name, of which 1500 "
+        "counts as 1"
+    ) in lines
+    assert "  conditioned on slope: 3 numbers a cell, computed" in lines
+    told = json.loads(vnca("info", own, "--json").out)
+    assert told["conditioning"] == [["density", 1], ["temperature", 1, 1500.0], ["slope", 3]]
+    seen = Model.load(own).rule  # known now, as what cannot be computed
+    domain = Domain(np.zeros((1, 3), np.int32), smoke_of_a_cell().box)
+    with pytest.raises(ModelError, match=r"conditioned on slope, .* `vnca.register_conditioning`"):
+        inputs.priors(domain, smoke_of_a_cell(), seen)
+
+
+def smoke_of_a_cell() -> Volume:
+    one = np.ones((1, 1, 1), np.float32)
+    return Volume(one, None, fields={"temperature": one})

@@ -305,11 +305,11 @@ def test_a_frame_with_other_voxels_goes_on_with_the_painting_there_and_that_is_t
         assert ratio.std() > 0.01
     # At the same place of the world colours are alike from frame to frame, and not elsewhere.
     shown = [at_centres(out / f"s_{n}.vdb", tiny_smoke) for n in (1, 2, 3)]
-    assert min(likeness(shown[1], shown[n]) for n in (0, 2)) > 0.25
-    assert likeness(shown[1], shown[0][::-1]) < 0.1
+    assert min(similarity(shown[1], shown[n]) for n in (0, 2)) > 0.25
+    assert similarity(shown[1], shown[0][::-1]) < 0.1
 
 
-def likeness(one: AnyArray, other: AnyArray) -> float:
+def similarity(one: AnyArray, other: AnyArray) -> float:
     """Correlation of how colours `[n, 3]` differ from their mean."""
     one, other = (colour - colour.mean(axis=0) for colour in (one, other))
     return float((one * other).sum() / np.sqrt((one**2).sum() * (other**2).sum()))

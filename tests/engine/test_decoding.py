@@ -123,7 +123,7 @@ CASES = {
     "several ranges": {"points": 5000, "cells": 3001},
     "no point": {"points": 0},
     "one point": {"points": 1, "cells": 1},
-    "nothing lives": {"cells": 0},
+    "no active cell": {"cells": 0},
     "all outside": {"outside": 1.0},
     "fewest channels": {"points": 40, "channels": 4, "units": 1},
     "odd": {"points": 49, "channels": 5, "units": 17},
@@ -165,7 +165,7 @@ TRITON_CASES = {
     "two tiles": {"points": 70, "cells": 100, "channels": 5, "units": 17},
     "two widths": {"points": 5, "cells": 3, "channels": 20, "units": 24},
     "fewest channels": {"points": 9, "channels": 4, "units": 1},
-    **{name: CASES[name] for name in ("no point", "one point", "nothing lives")},
+    **{name: CASES[name] for name in ("no point", "one point", "no active cell")},
 }
 if GPU:
     TRITON_CASES |= {name: case for name, case in CASES.items() if case.get("units", 0) <= 32}

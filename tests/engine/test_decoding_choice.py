@@ -3,7 +3,7 @@
 import pytest
 
 from vnca.core.errors import BackendUnavailableError, OptionError
-from vnca.engine import array_decode, native, torch_decode
+from vnca.engine import array_decode, backend_named, native, torch_decode
 from vnca.engine import numpy as array_reference
 from vnca.engine.reference import equations as reference
 from vnca.engine.triton import decode as decode_triton
@@ -47,3 +47,8 @@ def test_unknown_backends_are_refused() -> None:
             OptionError, match="fast: expected auto, native, triton, numpy, reference"
         ):
             choose("fast")
+
+
+def test_numpy_has_no_decoding_of_tensors() -> None:
+    with pytest.raises(BackendUnavailableError, match="numpy does not decode tensors"):
+        backend_named("numpy").decode()

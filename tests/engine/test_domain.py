@@ -63,12 +63,12 @@ def test_a_state_keeps_its_cells_when_the_domain_moves_and_new_cells_start_from_
     assert 0 < survives.sum() < len(new)
 
 
-def test_cells_live_within_reach_of_smoke_and_inside_the_box() -> None:
+def test_cells_are_active_near_smoke_and_inside_the_box() -> None:
     density = np.zeros((5, 5, 5), dtype=np.float32)
     density[0, 2, 2] = 1
     box = Box((10, 0, 0), (20, 5, 5))
     smoke = Field.from_dense(density, (10, 0, 0))
-    domain = Domain.around_smoke(smoke, threshold=0.5, reach=2, box=box)
+    domain = Domain.around_smoke(smoke, threshold=0.5, dilation=2, box=box)
     assert len(domain) == 3 * 5 * 5
     assert domain.cells[:, 0].max() == 12
 
@@ -87,13 +87,13 @@ def test_no_smoke_gives_no_cells() -> None:
     box = Box((0, 0, 0), (4, 4, 4))
     for size in (0, 4):
         empty = Field.from_dense(np.zeros((size,) * 3, dtype=np.float32), (0, 0, 0))
-        domain = Domain.around_smoke(empty, threshold=0.1, reach=2, box=box)
+        domain = Domain.around_smoke(empty, threshold=0.1, dilation=2, box=box)
         assert domain.neighbours.shape == (27, 0)
         assert domain.carry(np.ones((1, 3), np.float32), domain).shape == (1, 3)
 
 
 def listed(alive: BoolArray, origin: Index) -> IntArray:
-    """Living cells of a dense array, brick by brick: what a domain must list."""
+    """Active cells of a dense array, brick by brick: what a domain must list."""
     cells = np.argwhere(alive) + origin
     return cells[np.lexsort((*cells.T[::-1], *(cells // 8).T[::-1]))].astype(np.int32)
 
@@ -126,18 +126,18 @@ def test_a_domain_of_bricks_is_that_of_a_dense_array(
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 1000), shapes, origins, st.integers(0, 10), st.integers(-4, 4))
 def test_cells_around_smoke_are_those_a_dense_filter_finds(
-    seed: int, shape: Index, origin: Index, reach: int, margin: int
+    seed: int, shape: Index, origin: Index, dilation: int, margin: int
 ) -> None:
     density = np.random.default_rng(seed).random(shape).astype(np.float32) ** 64
     smoke = Field.from_dense(density, origin)
     box = smoke.box.grown(margin)
-    domain = Domain.around_smoke(smoke, threshold=0.5, reach=reach, box=box)
-    wide = np.pad(density > 0.5, reach + 4)
-    whole = smoke.box.grown(reach + 4)
+    domain = Domain.around_smoke(smoke, threshold=0.5, dilation=dilation, box=box)
+    wide = np.pad(density > 0.5, dilation + 4)
+    whole = smoke.box.grown(dilation + 4)
     in_box = np.zeros(wide.shape, bool)
     if not box.is_empty:
         in_box[box.intersection(whole).slices(whole)] = True
-    wide = np.asarray(ndimage.maximum_filter(wide & in_box, 2 * reach + 1)) & in_box
+    wide = np.asarray(ndimage.maximum_filter(wide & in_box, 2 * dilation + 1)) & in_box
     np.testing.assert_array_equal(domain.cells, listed(wide, whole.lower))
 
 

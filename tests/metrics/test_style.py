@@ -5,7 +5,13 @@ from scipy.ndimage import gaussian_filter
 from vnca.core import BoolArray, FloatArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError, ShapeError
-from vnca.metrics.style import StyleDistances, StyleMetric, gap_closed, mean_distances, perceived
+from vnca.metrics.style import (
+    StyleDistances,
+    StyleMetric,
+    mean_distances,
+    normalised_score,
+    perceived,
+)
 
 SIZE = 96
 DISC: BoolArray = np.hypot(*(np.mgrid[:SIZE, :SIZE] - SIZE / 2)) < 36
@@ -36,7 +42,7 @@ def cutout(metric: StyleMetric) -> StyleDistances:
 
 def closed(metric: StyleMetric, cutout: StyleDistances, picture: FloatArray) -> float:
     plain = metric.distances(GREY, DISC)
-    return gap_closed(metric.distances(picture, DISC), plain, cutout)
+    return normalised_score(metric.distances(picture, DISC), plain, cutout)
 
 
 def test_the_picture_itself_closes_the_gap_and_plain_grey_none_of_it(metric, cutout) -> None:
@@ -108,7 +114,7 @@ def test_what_is_no_style_picture_is_refused(picture, shorter, error) -> None:
 
 
 def test_being_nearer_than_the_picture_is_makes_up_for_nothing() -> None:
-    assert gap_closed((0.0, 0.6), (1.0, 1.0), (0.2, 0.2)) == pytest.approx(0.75)
-    assert gap_closed((1.8,), (1.0,), (0.2,)) == pytest.approx(-1)
-    assert gap_closed((0.1,), (0.2,), (0.2,)) == 1
-    assert gap_closed((0.3,), (0.2,), (0.2,)) == 0
+    assert normalised_score((0.0, 0.6), (1.0, 1.0), (0.2, 0.2)) == pytest.approx(0.75)
+    assert normalised_score((1.8,), (1.0,), (0.2,)) == pytest.approx(-1)
+    assert normalised_score((0.1,), (0.2,), (0.2,)) == 1
+    assert normalised_score((0.3,), (0.2,), (0.2,)) == 0

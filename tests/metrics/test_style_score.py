@@ -40,7 +40,7 @@ def test_smoke_as_it_comes_closes_nothing(tiny_smoke: Volume, picture: FloatArra
     pairs = [setup.look_twice(plain, plain, viewpoint) for viewpoint in SIDES]
     found = score_style(metric, pairs)
     assert found is not None
-    assert found.gap_closed == pytest.approx(0, abs=0.02)
+    assert found.normalised_score == pytest.approx(0, abs=0.02)
     assert found.by_measure["palette"] == pytest.approx(0, abs=0.1)
 
 
@@ -54,7 +54,7 @@ def test_paint_of_the_right_colours_closes_more(tiny_smoke: Volume, picture: Flo
         metric, [setup.look_twice(painted, plain, viewpoint) for viewpoint in SIDES]
     )
     assert found is not None
-    assert found.gap_closed > 0.3
+    assert found.normalised_score > 0.3
     assert found.by_measure["palette"] > 0.3
     assert 0 <= found.spread < 0.2
 

@@ -59,7 +59,7 @@ struct Problem {
         for (std::int32_t& row : row_at)
             if (row < 0) row = std::int32_t(cells);
 
-        // The border repeats cells; where nothing lives is the row behind the last.
+        // The border repeats cells; where no cell is active is the row behind the last.
         const auto at = [&](int x, int y, int z) -> std::int32_t& {
             return row_at[(std::clamp(x, 0, c.x - 1) * c.y + std::clamp(y, 0, c.y - 1)) * c.z +
                           std::clamp(z, 0, c.z - 1)];

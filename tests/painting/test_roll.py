@@ -175,15 +175,15 @@ def test_options_out_of_range_are_named() -> None:
         dataclasses.replace(StylizeConfig(), steps_per_frame=-1)
 
 
-@pytest.mark.parametrize("reach", [0, 2])
-def test_cells_live_as_far_from_the_smoke_as_the_rule_was_trained_with(reach: int) -> None:
-    config = dataclasses.replace(RULE.config, dilation=reach)
+@pytest.mark.parametrize("dilation", [0, 2])
+def test_cells_are_active_as_far_from_the_smoke_as_the_rule_was_trained_with(dilation: int) -> None:
+    config = dataclasses.replace(RULE.config, dilation=dilation)
     rule = dataclasses.replace(RULE, config=config)
     smoke = Volume(np.pad(ball(0).density, 4), None, (0, 0, 0), np.eye(4), 0)
     (painting,) = stylize([smoke], rule, StylizeConfig(), box=smoke.box)
     lived = np.zeros(smoke.density.shape, bool)
     lived[tuple(painting.state.cells.T)] = True
-    near = ndimage.maximum_filter(smoke.density > 0.5, 2 * reach + 1)
+    near = ndimage.maximum_filter(smoke.density > 0.5, 2 * dilation + 1)
     np.testing.assert_array_equal(lived, near)
 
 
@@ -221,7 +221,7 @@ def test_faint_smoke_has_the_colour_of_the_painting_beside_it_and_is_white_farth
     np.testing.assert_array_equal(painting.density[~lived], painting.smoke.density[~lived])
 
 
-def test_a_fringe_fades_with_the_painting() -> None:
+def test_dilated_colour_fades_with_the_painting() -> None:
     half, full = faint(colour_dilation=2, strength=0.5), faint(colour_dilation=2)
     np.testing.assert_allclose(half.colour, 0.5 + 0.5 * full.colour, rtol=1e-6)
     np.testing.assert_array_equal(faint(colour_dilation=2, strength=0.0).colour, 1)

@@ -46,7 +46,7 @@ class Case:
     """One step, the same for every backend, and a gradient of its result.
 
     Attributes:
-        domain: The cells that live.
+        domain: The active cells.
         rows: `[m]` those that change.
         state: `[n + 1, C]`.
         priors: `[n, P]`.
@@ -63,7 +63,7 @@ class Case:
 
     @classmethod
     def draw(cls, grid: Index, hidden: int, occupancy: float) -> "Case":
-        """Random values; with an occupancy under 1 only the cells of a ragged column live."""
+        """Random values; with an occupancy under 1 only the cells of a ragged column are active."""
         random = np.random.default_rng(0)
 
         def normal(*shape: int, scale: float = 1.0) -> FloatArray:
@@ -95,7 +95,7 @@ class Case:
 
     @property
     def occupancy(self) -> float:
-        """Share of the grid's cells that live."""
+        """Share of the grid's cells that are active."""
         return len(self.domain) / float(np.prod(self.domain.box.shape))
 
     def rounded(self, dtype: torch.dtype) -> "Case":
@@ -150,7 +150,7 @@ def plain_step(
     """The state after one step; differentiable.
 
     Args:
-        grid: State `[1, C, x, y, z]`, zero where nothing lives.
+        grid: State `[1, C, x, y, z]`, zero where no cell is active.
         mask: `[1, 1, x, y, z]`, 1 where cells change, 0 elsewhere.
         priors: `[1, P, x, y, z]`.
         filters: `[4C, 1, 3, 3, 3]` from `depthwise`.
@@ -195,7 +195,7 @@ class Grid:
         self._places = torch.from_numpy(domain.places).to(device)
 
     def spread(self, values: Tensor) -> Tensor:
-        """`[1, K, x, y, z]` of values `[n, K]`, zero where nothing lives; differentiable."""
+        """`[1, K, x, y, z]` of values `[n, K]`, zero where no cell is active; differentiable."""
         flat = values.new_zeros(values.shape[1], int(np.prod(self._shape)))
         return flat.index_copy(1, self._places, values.t()).view(1, -1, *self._shape)
 

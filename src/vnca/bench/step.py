@@ -83,7 +83,7 @@ class StepConfig:
     hidden: int = 128
     """Hidden units."""
     occupancy: float = 1.0
-    """Share of the cells that live, in a ragged column; rows say what it really is."""
+    """Share of the active cells, in a ragged column; rows say what it really is."""
     backends: tuple[str, ...] = ()
     """Of plain, compile, reference, native and triton; all that can run here unless given."""
     passes: tuple[str, ...] = ("forward", "both")

@@ -20,7 +20,15 @@ from vnca.core.files import existing_file, writable_file
 from vnca.io.film import contact_sheet
 from vnca.io.picture import fit, write_image
 from vnca.io.vdb import GridHeader, open_vdb
-from vnca.rule.model import MODEL_NAME, Model, load_style, style_names, style_thumbnail
+from vnca.rule import CONDITIONING
+from vnca.rule.model import (
+    MODEL_NAME,
+    Model,
+    listed_conditioning,
+    load_style,
+    style_names,
+    style_thumbnail,
+)
 
 
 @dataclass(frozen=True)
@@ -79,12 +87,13 @@ def _is_model(path: Path) -> bool:
 
 
 def _model_facts(path: Path) -> dict[str, Any]:
-    model = Model.load(path)
+    model = Model.load(path, to_describe=True)
     return {
         "kind": "model",
         "version": model.version,
         "weights": model.rule.weight_count,
         "rule": asdict(model.rule.config),
+        "conditioning": list(map(listed_conditioning, model.rule.config.conditioning)),
         "scales": asdict(model.rule.scales),
         "training": model.training,
     }
@@ -117,7 +126,7 @@ def _grid_facts(header: GridHeader) -> dict[str, Any]:
 
 def describe_model(path: Path) -> list[str]:
     """Lines about a model: its shape, its normalisers and where it comes from."""
-    model = Model.load(path)
+    model = Model.load(path, to_describe=True)
     config, scales = model.rule.config, model.rule.scales
     switched_off = [
         name for name in ("position", "density", "velocity") if not getattr(config, f"{name}_prior")
@@ -127,10 +136,23 @@ def describe_model(path: Path) -> list[str]:
         f"  rule        {config.channels} channels, {config.hidden} hidden, "
         f"update probability {config.update_probability:g}",
         f"  priors off  {', '.join(switched_off) or 'none'}",
+        *(
+            f"  conditioned on {_described_input(name)}"
+            for name in config.conditioning
+            if name not in CONDITIONING
+        ),
         f"  scales      density {scales.density:.4g}, velocity {scales.velocity:.4g} cells/frame, "
         f"gamma {scales.gamma:.4g} per cell",
         *(f"  {name:11} {json.dumps(value)}" for name, value in model.training.items()),
     ]
+
+
+def _described_input(name: str) -> str:
+    """What a rule is conditioned on beside position, density and velocity."""
+    _, width, *scale = listed_conditioning(name)
+    numbers = f"{width} number{'s' * (width > 1)} a cell"
+    known = f"the grid of that name, of which {scale[0]:g} counts as 1" if scale else "computed"
+    return f"{name}: {numbers}, {known}"
 
 
 def describe_vdb(path: Path) -> list[str]:

@@ -292,12 +292,12 @@ def _flat_places(places: Places, runs: AnyArray, lengths: AnyArray, cells: AnyAr
     return at
 
 
-def dilated(marked: Field, reach: int) -> Field:
-    """Cells at most `reach` cells along each axis from one in a field of booleans, in its box."""
-    bricks = bricks_beside(marked.bricks, -(-reach // EDGE))
+def dilated(marked: Field, cells: int) -> Field:
+    """Cells at most `cells` cells along each axis from one in a field of booleans, in its box."""
+    bricks = bricks_beside(marked.bricks, -(-cells // EDGE))
     grown = replace(marked, bricks=bricks, values=marked.blocks(bricks))
     for axis in range(3):
-        for _ in range(reach):
+        for _ in range(cells):
             ahead, behind = grown.shifted(axis, 1), grown.shifted(axis, -1)
             np.logical_or(grown.values, np.logical_or(ahead, behind, out=ahead), out=grown.values)
     return grown.within(marked.box).trimmed()

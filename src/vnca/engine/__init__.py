@@ -9,7 +9,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -182,8 +182,20 @@ class StepSession(Session):
         return self.back(state)
 
 
+class ArrayDecode(NamedTuple):
+    """Decoding of arrays.
+
+    Attributes:
+        decode: What is seen at points, called as `vnca.engine.native.decode` is.
+        decode_cells: What is seen in the parts of cells, called as `native.decode_cells` is.
+    """
+
+    decode: Callable[..., FloatArray]
+    decode_cells: Callable[..., FloatArray]
+
+
 class Backend(ABC):
-    """One way to compute steps.
+    """One way to compute steps, and to decode the states they lead to.
 
     Attributes:
         name: As a user asks for it.
@@ -221,6 +233,19 @@ class Backend(ABC):
         """
         del threads, precision
         raise BackendUnavailableError(f"backend {self.name} has no step on tensors")
+
+    def decode(self, *, threads: int | None = None) -> Callable[..., Any]:
+        """Differentiable decoding of tensors, called as that of the reference is.
+
+        Raises:
+            BackendUnavailableError: If the backend has none.
+        """
+        del threads
+        raise BackendUnavailableError(f"backend {self.name} does not decode tensors")
+
+    def array_decode(self, *, threads: int | None = None) -> "ArrayDecode":
+        """Decoding of arrays: numpy's, unless the backend has its own."""
+        return backend_named("numpy").array_decode(threads=threads)
 
 
 def backend_named(name: str) -> Backend:
@@ -284,15 +309,10 @@ def open_session(
     return backend.session(Job(automaton, domain, conditioning, compute, differentiable))
 
 
-@cache
-def _say_once(line: str) -> None:
-    print(line, file=sys.stderr)
-
-
 def torch_decode(
     backend: str = "auto", *, device: str = "cpu", threads: int | None = None
 ) -> Callable[..., Any]:
-    """Differentiable decoding of tensors, called as `vnca.engine.reference.equations.decode` is.
+    """Differentiable decoding of tensors by the backend that would step them.
 
     Args:
         backend: `auto`, `native`, `triton` or `reference`.
@@ -303,30 +323,7 @@ def torch_decode(
         BackendUnavailableError: If the backend asked for cannot run here.
         OptionError: If there is no backend of that name.
     """
-    chosen = choose(Compute(backend, device), differentiable=True).name
-    if chosen == "native":
-        from vnca.engine.native.autograd import decode
-
-        return partial(decode, threads=threads)
-    if chosen == "triton":
-        from vnca.engine.triton.decode import decode
-
-        return decode
-    from vnca.engine.reference.equations import decode
-
-    return decode
-
-
-class ArrayDecode(NamedTuple):
-    """Decoding of arrays.
-
-    Attributes:
-        decode: What is seen at points, called as `vnca.engine.native.decode` is.
-        decode_cells: What is seen in the parts of cells, called as `native.decode_cells` is.
-    """
-
-    decode: Callable[..., FloatArray]
-    decode_cells: Callable[..., FloatArray]
+    return choose(Compute(backend, device), differentiable=True).decode(threads=threads)
 
 
 def array_decode(backend: str = "auto", *, threads: int | None = None) -> ArrayDecode:
@@ -336,12 +333,9 @@ def array_decode(backend: str = "auto", *, threads: int | None = None) -> ArrayD
     decode what was read back.
     """
     backend = {"triton": "auto", "reference": "numpy"}.get(backend, backend)
-    if choose(Compute(backend)).name == "native":
-        from vnca.engine import native
+    return choose(Compute(backend)).array_decode(threads=threads)
 
-        return ArrayDecode(
-            partial(native.decode, threads=threads), partial(native.decode_cells, threads=threads)
-        )
-    from vnca.engine import numpy as array_reference
 
-    return ArrayDecode(array_reference.decode, array_reference.decode_cells)
+@cache
+def _say_once(line: str) -> None:
+    print(line, file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Where cells live: within reach of the smoke or in all of its box, in index space."""
+"""Which cells are active: those near the smoke or in all of its box, in index space."""
 
 import math
 from dataclasses import dataclass, replace
@@ -15,11 +15,11 @@ from vnca.core.field import Field, dilated
 from vnca.engine.automaton import OFFSETS, HashArray, hash_cells
 
 MOST_CELLS = 2**27
-"""A larger box (512³) may not live as a whole."""
+"""A larger box (512³) may not be active as a whole."""
 
 Border = Literal["replicate", "circular"]
 DomainKind = Literal["active", "box"]
-"""Cells within reach of the smoke, or all cells of its box."""
+"""Cells near the smoke, or all cells of its box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +27,12 @@ class Domain:
     """Cells that are alive, as a list; the states of an automaton are kept in its order.
 
     A state over a domain is `[n + 1, C]`: a row a cell, and a last row of zeros that stands for
-    everything that does not live. Cost and memory follow the smoke, not its box.
+    everything that is not active. Cost and memory follow the smoke, not its box.
 
     Attributes:
         cells: `[n, 3]` index coordinates, all inside `box`, each once; brick by brick, so that
             neighbours in space are neighbours in memory.
-        box: Beyond its border neighbours are repeated or wrapped, even where nothing lives.
+        box: Beyond its border neighbours are repeated or wrapped, even for the outside.
         border: What a cell at the border of the box sees beyond it.
     """
 
@@ -57,14 +57,14 @@ class Domain:
         return cls(cells_at(field.bricks, field.values), box or field.box, border)
 
     @classmethod
-    def around_smoke(cls, density: Field, *, threshold: float, reach: int, box: Box) -> "Domain":
-        """Cells of `box` at most `reach` cells (along each axis) from density over `threshold`.
+    def around_smoke(cls, density: Field, *, threshold: float, dilation: int, box: Box) -> "Domain":
+        """Cells of `box` at most `dilation` cells (along each axis) from density over `threshold`.
 
-        The reach lets a cell live for a while before smoke arrives in it.
+        Dilation makes a cell active for a while before smoke arrives in it.
         """
         smoke = replace(density, values=density.values > threshold, outside=False)
         smoke = smoke.within(box).trimmed()
-        alive = dilated(replace(smoke, box=smoke.box.grown(reach).intersection(box)), reach)
+        alive = dilated(replace(smoke, box=smoke.box.grown(dilation).intersection(box)), dilation)
         return cls(cells_at(alive.bricks, alive.values), box)
 
     @classmethod
@@ -77,7 +77,7 @@ class Domain:
         if math.prod(box.shape) > MOST_CELLS:
             raise OptionError(
                 f"`domain` box: the box of the smoke, {box.lower} to {box.upper}, has "
-                f"{math.prod(box.shape)} cells, and at most {MOST_CELLS} can live; "
+                f"{math.prod(box.shape)} cells, and at most {MOST_CELLS} can be active; "
                 "use `domain` active"
             )
         return cls.from_mask(np.ones(box.shape, dtype=bool), box.lower)
@@ -88,13 +88,13 @@ class Domain:
 
     @cached_property
     def rows(self) -> Field:
-        """The row of each cell in the state, n where nothing lives."""
+        """The row of each cell in the state, n for the outside."""
         rows = np.arange(len(self), dtype=np.int32)
         return Field.from_cells(self.cells, rows, self.box, outside=np.int32(len(self)))
 
     @cached_property
     def neighbours(self) -> IntArray:
-        """`[27, n]` rows of the state around each cell, n where nothing lives."""
+        """`[27, n]` rows of the state around each cell, n for the outside."""
         result = np.empty((len(OFFSETS), len(self)), np.int32)
         if len(self) == 0:
             return result
@@ -126,7 +126,7 @@ class Domain:
             points: `[m, 3]` index coordinates, finite; cell `[i, j, k]` has its centre there.
 
         Returns:
-            Rows `[8, m]` of the state around each point, z fastest, n where nothing lives; and
+            Rows `[8, m]` of the state around each point, z fastest, n for the outside; and
             `[m, 3]` how far it lies from the first of these cells to the last, 0 to 1.
         """
         lower, upper = np.asarray(self.box.lower), np.asarray(self.box.upper)
@@ -156,7 +156,7 @@ class Domain:
         return np.zeros((len(self) + 1, channels), dtype=np.float32)
 
     def scatter(self, values: AnyArray, box: Box) -> AnyArray:
-        """Dense `[x, y, z, ...]` over `box` of values `[n, ...]`, zero where nothing lives."""
+        """Dense `[x, y, z, ...]` over `box` of values `[n, ...]`, zero where no cell is active."""
         at = self.cells - np.asarray(box.lower, dtype=np.int32)
         reached = ((at >= 0) & (at < box.shape)).all(axis=1)
         field = np.zeros((*box.shape, *values.shape[1:]), dtype=values.dtype)
@@ -174,7 +174,7 @@ def subdivided(cells: IntArray, neighbours: IntArray, factor: int) -> tuple[IntA
 
     Args:
         cells: `[m]` rows of the cells.
-        neighbours: `[27, n]` rows of the state around each cell; n where nothing lives.
+        neighbours: `[27, n]` rows of the state around each cell; n for the outside.
         factor: Parts along each axis of a cell.
 
     Returns:

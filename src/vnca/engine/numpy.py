@@ -9,12 +9,14 @@ from itertools import product
 import numpy as np
 
 from vnca.core import FloatArray, IntArray
-from vnca.engine import Backend, Compute, Job, Session, StepSession
+from vnca.engine import ArrayDecode, Backend, Compute, Job, Session, StepSession
 from vnca.engine.automaton import OUTPUTS, DecoderWeights, Weights, changing_rows
 from vnca.engine.domain import subdivided
 
 SLAB = 4096
 """Cells worked through at a time: their perception and hidden layer stay in cache."""
+POINT_SLAB = 4096
+"""Points worked through at a time: their hidden layers stay in cache."""
 
 
 def update(
@@ -36,34 +38,10 @@ def update(
     return result
 
 
-class NumpyBackend(Backend):
-    """Runs everywhere, forward only."""
-
-    name = "numpy"
-    has_gradients = False
-
-    def missing(self, compute: Compute) -> str | None:
-        """See `Backend.missing`."""
-        if compute.device_type != "cpu":
-            return f"numpy works on the CPU, not on {compute.device_type}"
-        return None
-
-    def session(self, job: Job) -> Session:
-        """See `Backend.session`."""
-        return StepSession.open(job, draw=draw, update=update)
-
-
 def draw(hashes: IntArray, *, seed: int, step: int, probability: float) -> IntArray:
     """Rows `[m]` of the cells that change; `hashes` `[n]` are the bits of `hash_cells` as int32."""
     bits = hashes.view(np.uint32)
     return changing_rows(bits, seed=seed, step=step, probability=probability)
-
-
-BACKEND = NumpyBackend()
-
-
-POINT_SLAB = 4096
-"""Points worked through at a time: their hidden layers stay in cache."""
 
 
 def decode(
@@ -117,3 +95,27 @@ def _decoded(state: FloatArray, weights: DecoderWeights) -> FloatArray:
     hidden = np.sin(hidden @ weights.second.T + weights.second_bias)
     hidden = np.sin(hidden @ weights.third.T + weights.third_bias)
     return state[:, :OUTPUTS] + hidden @ weights.output.T + weights.output_bias
+
+
+class NumpyBackend(Backend):
+    """Runs everywhere, forward only."""
+
+    name = "numpy"
+    has_gradients = False
+
+    def missing(self, compute: Compute) -> str | None:
+        """See `Backend.missing`."""
+        if compute.device_type != "cpu":
+            return f"numpy works on the CPU, not on {compute.device_type}"
+        return None
+
+    def session(self, job: Job) -> Session:
+        """See `Backend.session`."""
+        return StepSession.open(job, draw=draw, update=update)
+
+    def array_decode(self, *, threads: int | None = None) -> ArrayDecode:
+        """See `Backend.array_decode`."""
+        return ArrayDecode(decode, decode_cells)
+
+
+BACKEND = NumpyBackend()

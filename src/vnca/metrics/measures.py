@@ -119,14 +119,14 @@ def _style(survey: Survey) -> Iterable[Measure]:
         "Normalised style score",
         "How much of the way from grey smoke to the picture the painting goes: 1 is as near as "
         "the picture's own parts are.",
-        style.gap_closed,
+        style.normalised_score,
         _NORMALISED,
         "higher",
         unstylized=0.0,
         more={
             **style.by_measure,
             "frames": {
-                frame: style_score.gap_closed for frame, style_score in survey.style.items()
+                frame: style_score.normalised_score for frame, style_score in survey.style.items()
             },
         },
     )
@@ -174,7 +174,7 @@ def _views(survey: Survey) -> Iterable[Measure]:
         "lower",
         more={
             "frame": turn.frame,
-            "mean": turn.style_score.gap_closed,
+            "mean": turn.style_score.normalised_score,
             "views": [
                 {
                     "azimuth": viewpoint.azimuth,

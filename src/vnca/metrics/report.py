@@ -116,7 +116,12 @@ def _style(survey: Survey) -> Iterable[str]:
     yield f"<table>{''.join(rows)}</table>"
     yield plot(
         [
-            Line("all together", [*survey.style], [part.gap_closed for part in parts], "painted"),
+            Line(
+                "all together",
+                [*survey.style],
+                [part.normalised_score for part in parts],
+                "painted",
+            ),
             *(
                 Line(name, [*survey.style], [part.by_measure[name] for part in parts], shade)
                 for name, shade in _SHADES.items()

@@ -17,7 +17,7 @@ from scipy.spatial import KDTree
 from vnca.core import AnyArray, BoolArray, FloatArray
 from vnca.features.strokes import distance_inside, find_ridges
 from vnca.metrics.setup import Pair
-from vnca.metrics.style import StyleMetric, gap_closed, perceived
+from vnca.metrics.style import StyleMetric, normalised_score, perceived
 
 FEWEST = 64
 """Points without which a view says nothing about structure."""
@@ -160,8 +160,8 @@ class StructureMetric:
             direction=float(
                 np.mean([np.abs(_smooth(one.directions - ways)).sum() / 2 for one in found])
             ),
-            regions=None if None in regions else gap_closed(*([r] for r in regions)),  # pyright: ignore[reportArgumentType]
-            patches=gap_closed(
+            regions=None if None in regions else normalised_score(*([r] for r in regions)),  # pyright: ignore[reportArgumentType]
+            patches=normalised_score(
                 [self._by_patches(painted)], [self._by_patches(plain)], [self._halves()]
             ),
         )

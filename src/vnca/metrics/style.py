@@ -70,7 +70,9 @@ def mean_distances(distances: Iterable[StyleDistances]) -> StyleDistances:
     return StyleDistances(palette, texture, spectrum)
 
 
-def gap_closed(painted: Sequence[float], plain: Sequence[float], cutout: Sequence[float]) -> float:
+def normalised_score(
+    painted: Sequence[float], plain: Sequence[float], cutout: Sequence[float]
+) -> float:
     """1 − Σ (painted − cutout)₊ / Σ (plain − cutout)₊: the share of the way to the picture.
 
     1 for what is as near to the picture as its own parts are, by every measure; 0 for smoke as it

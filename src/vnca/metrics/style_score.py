@@ -22,7 +22,7 @@ from vnca.features import SMALLEST, FeatureNetwork
 from vnca.io.smoke_format import on_one_lattice
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
 from vnca.metrics.setup import SIZE, Coloured, Pair, Setup, Viewpoint
-from vnca.metrics.style import StyleDistances, StyleMetric, gap_closed, mean_distances
+from vnca.metrics.style import StyleDistances, StyleMetric, mean_distances, normalised_score
 from vnca.painting import StylizeConfig, stylize
 from vnca.rule import Rule
 from vnca.training.scenes.texture import FAMILIES, as_picture, shown, slice_points
@@ -44,7 +44,7 @@ class Judge:
         name: What it is called.
         trained_with: Whether the rule was trained with it; None if its file does not tell.
         reason: Why it cannot judge, if it cannot.
-        shares: The share of the gap closed, by frame.
+        shares: The normalised score, by frame.
     """
 
     name: str
@@ -91,7 +91,7 @@ class Judge:
                 ],
             )
         )
-        self.shares[frame] = gap_closed([painted], [plain], [cutout])
+        self.shares[frame] = normalised_score([painted], [plain], [cutout])
 
     @torch.no_grad()
     def _distance(self, picture: AnyArray, where: BoolArray) -> float:
@@ -173,11 +173,11 @@ class StyleScore:
     @property
     def shares(self) -> list[float]:
         """The share of the gap that each view closes, by all measures together."""
-        return [gap_closed(distances, self.plain, self.cutout) for distances in self.painted]
+        return [normalised_score(distances, self.plain, self.cutout) for distances in self.painted]
 
     @property
-    def gap_closed(self) -> float:
-        """The share of the gap closed, mean over the views."""
+    def normalised_score(self) -> float:
+        """The normalised score, mean over the views."""
         return float(np.mean(self.shares))
 
     @property
@@ -187,12 +187,12 @@ class StyleScore:
 
     @property
     def by_measure(self) -> dict[str, float]:
-        """The share of the gap closed by each measure alone, mean over the views."""
+        """The normalised score by each measure alone, mean over the views."""
         return {
             name: float(
                 np.mean(
                     [
-                        gap_closed(
+                        normalised_score(
                             d[at : at + 1], self.plain[at : at + 1], self.cutout[at : at + 1]
                         )
                         for d in self.painted

@@ -163,7 +163,7 @@ class Roll:
 
     @property
     def domain_kind(self) -> DomainKind:
-        """Where cells live: as asked for, or else as in training."""
+        """Which cells are active: as asked for, or else as in training."""
         return self.config.domain or self.rule.config.domain
 
     def refined(self, factor: int) -> "Roll":
@@ -192,8 +192,8 @@ class Roll:
     def paint(self, smoke: Volume, state: RollState) -> Painting:
         """The next frame, of the same lattice, from the state that the one before it left.
 
-        A frame without smoke passes through. The painting starts afresh after it, unless cells
-        live in the whole box.
+        A frame without smoke passes through. The painting starts afresh after it, unless
+        the whole box is active.
 
         Args:
             smoke: On a grid as fine as the automaton's.
@@ -212,9 +212,9 @@ class Roll:
             values, steps = domain.seed(rule.config.channels), config.warmup + steps
         else:
             values = Domain(state.cells, domain.box).carry(state.values, domain)
-        told = priors(domain, smoke, rule)
+        conditioning = priors(domain, smoke, rule)
         done = state.steps_done + steps
-        session = open_session(rule.automaton(config.seed), domain, told, self.compute)
+        session = open_session(rule.automaton(config.seed), domain, conditioning, self.compute)
         uploaded = session.upload(values)
         values = session.read(session.run(uploaded, range(state.steps_done, done)))
         return RollState(domain.cells, values, done)
@@ -259,13 +259,13 @@ class Roll:
         return at.astype(np.int32, copy=False), colour.reshape(-1, 3), factors.reshape(-1)
 
     def _domain(self, smoke: Volume) -> Domain:
-        """The cells that live in a frame."""
+        """The active cells of a frame."""
         if self.domain_kind == "box":
             return self._whole_box
         return Domain.around_smoke(
             smoke.density_field,
             threshold=SMOKE_THRESHOLD * self.rule.scales.density,
-            reach=self.rule.config.dilation,
+            dilation=self.rule.config.dilation,
             box=self.box.grown(self.rule.config.dilation),
         )
 

@@ -13,7 +13,9 @@ from types import UnionType
 from typing import Any, Literal, Protocol, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from vnca.core.errors import ModelError
+from vnca.core.records import distributed
 from vnca.io.smoke_format import SmokeFormat
+from vnca.painting import StylizeConfig
 from vnca.rule.model import CONFIG_NAME, Model, from_record
 
 T = TypeVar("T")
@@ -153,6 +155,25 @@ def load(path: str | Path) -> Model:
     return dataclasses.replace(Model.load(path), inputs=inputs)
 
 
-def loaded(model: str | Path | Model) -> Model:
-    """The model itself, or that of a path; errors as of `load`."""
-    return model if isinstance(model, Model) else load(model)
+def applied(
+    model: str | Path | Model, options: Mapping[str, Any]
+) -> tuple[Path, Model, SmokeFormat, StylizeConfig]:
+    """A model as a call from Python applies it.
+
+    Args:
+        model: The model, or its path.
+        options: Fields of `SmokeFormat` and `StylizeConfig`, in the place of those recorded.
+
+    Returns:
+        Where it lies, the model, how smoke is read for it and how it is rolled.
+
+    Raises:
+        ModelError: As of `load`, or if what it tells of smoke makes no sense.
+        FileFormatError: As of `load`.
+        OptionError: If an option is unknown or out of range.
+    """
+    path = IN_MEMORY if isinstance(model, Model) else Path(model)
+    model = model if isinstance(model, Model) else load(model)
+    recorded = recorded_smoke(path, model) or SmokeFormat()
+    smoke, config = distributed(options, recorded, StylizeConfig())
+    return path, model, smoke, config

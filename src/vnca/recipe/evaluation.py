@@ -15,7 +15,6 @@ from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import whole_file, writable_folder
 from vnca.core.lattice import Region
-from vnca.core.records import distributed
 from vnca.core.volume import Volume
 from vnca.engine import Compute
 from vnca.features import load_network
@@ -31,7 +30,7 @@ from vnca.metrics.style import SMALLEST, StyleMetric
 from vnca.metrics.style_score import Judge
 from vnca.painting import StylizeConfig, stylize
 from vnca.painting.frames import StillSmoke, require_dense
-from vnca.recipe import IN_MEMORY, PICTURE_CELLS, SILENT, Watch, loaded, recorded_smoke, tracked
+from vnca.recipe import PICTURE_CELLS, SILENT, Watch, applied, tracked
 from vnca.recipe.sequence import open_sequence, placed, region_of, sequence_region, volumes
 from vnca.rule.model import Model
 from vnca.rule.paint import require_refinement
@@ -156,10 +155,7 @@ def evaluate(
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
-    name = IN_MEMORY if isinstance(model, Model) else Path(model)
-    model = loaded(model)
-    recorded = recorded_smoke(name, model) or SmokeFormat()
-    smoke, config = distributed(options, recorded, StylizeConfig())
+    name, model, smoke, config = applied(model, options)
     if sequence is None and isinstance(model.inputs.get("frame"), Volume):
         sequence = model.inputs["frame"]
     if isinstance(sequence, Volume):

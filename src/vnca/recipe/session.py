@@ -99,6 +99,47 @@ class Session:
     preview_every: int
     watch: Watch
 
+    @classmethod
+    def begun(
+        cls,
+        options: TrainingOptions,
+        kind: type[TrainingOptions],
+        command: str,
+        trainer: Trainer,
+        network: FeatureNetwork,
+        *,
+        folder: RunFolder | NoFolder,
+        style: FloatArray,
+        training: Mapping[str, Any],
+        inputs: Mapping[str, str],
+        watch: Watch,
+    ) -> "Session":
+        """A session as its options ask for it.
+
+        Args:
+            options: An instance of `kind`, or of a subclass that adds what need not be known.
+            kind: What is asked of such a training.
+            command: See above.
+            trainer: See above.
+            network: What compares pictures.
+            folder: See above.
+            style: See above.
+            training: What the model file tells beside the network and the size of the picture.
+            inputs: See above.
+            watch: See above.
+        """
+        return cls(
+            command,
+            trainer,
+            folder,
+            style,
+            {**training, **shown_and_judged(trainer, network)},
+            inputs,
+            asked(kind, options),
+            options.preview_every,
+            watch,
+        )
+
     def run(self, checkpoint: Checkpoint | None, *notes: str) -> Model:
         """Train from the beginning or from a checkpoint on, to the end or to Ctrl-C.
 

@@ -24,12 +24,10 @@ from vnca.recipe.session import (
     ResumeOptions,
     Session,
     TrainingOptions,
-    asked,
     choose_device,
     fitting,
     interrupted,
     run_folder,
-    shown_and_judged,
 )
 from vnca.recipe.texture import pretraining_config, rule_to_go_on_with, without_prior_weights
 from vnca.rule import Rule
@@ -213,31 +211,31 @@ def run(
         "seed": config.seed,
         "device": str(device),
         "smoke": dataclasses.asdict(smoke_format),
-        **shown_and_judged(trainer, network),
     }
-    session = Session(
-        command=COMMAND,
-        trainer=trainer,
+    session = Session.begun(
+        dataclasses.replace(options, smoke=smoke_format),
+        SmokeRun,
+        COMMAND,
+        trainer,
+        network,
         folder=folder,
         style=style,
         training=training,
         inputs=training_inputs(smoke, style, config, network, terms),
-        asked=asked(SmokeRun, dataclasses.replace(options, smoke=smoke_format)),
-        preview_every=options.preview_every,
         watch=watch,
     )
     if checkpoint is None or not checkpoint.training:
         if checkpoint is not None:
             checkpoint.require(session.inputs, folder.checkpoint_path)
-        beginning = pretraining_config(config, trainer.picture_cells)
+        texture_config = pretraining_config(config, trainer.picture_cells)
         if options.init is not None:
             trainer.begin_with(rule_to_go_on_with(options.init, trainer.rule()))
-        elif beginning is not None:
+        elif texture_config is not None:
             if checkpoint is None and options.overwrite and options.out is not None:
                 # Resuming must not take the texture of the run that was there for this one's.
                 remove_file(options.out / TEXTURE_FOLDER / MODEL_NAME)
             folder.reserve(Checkpoint({}, session.inputs, COMMAND, session.asked))
-            rule = _texture(options, beginning, style, watch, goes_on=checkpoint is not None)
+            rule = _texture(options, texture_config, style, watch, goes_on=checkpoint is not None)
             trainer.begin_with(without_prior_weights(rule))
         checkpoint = None
     notes = []

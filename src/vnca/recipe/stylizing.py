@@ -10,16 +10,16 @@ from typing import Any
 
 from vnca.core import FloatArray
 from vnca.core.errors import OptionError
-from vnca.core.records import changed, distributed
+from vnca.core.records import changed
 from vnca.core.volume import Volume
 from vnca.engine import Compute
-from vnca.io import SmokeFormat, with_fitted_scale
+from vnca.io import with_fitted_scale
 from vnca.io.sequence import find_frames
-from vnca.painting import Painting, StylizeConfig
+from vnca.painting import Painting
 from vnca.painting import stylize as stylize_volumes
 from vnca.painting.frames import StillSmoke, require_dense
 from vnca.painting.painter import OnError
-from vnca.recipe import IN_MEMORY, SILENT, Watch, loaded, recorded_smoke, tracked
+from vnca.recipe import SILENT, Watch, applied, tracked
 from vnca.recipe.film import FilmConfig, Shown
 from vnca.recipe.painting import StylizeRun, read_painted, run
 from vnca.recipe.sequence import (
@@ -117,10 +117,7 @@ def stylize(
         VncaError: At once if an input cannot be used or the output cannot be written; while
             painting, if a frame cannot be read or written.
     """
-    name = IN_MEMORY if isinstance(model, Model) else Path(model)
-    model = loaded(model)
-    recorded = recorded_smoke(name, model) or SmokeFormat()
-    smoke, config = distributed(options, recorded, StylizeConfig())
+    name, model, smoke, config = applied(model, options)
     if isinstance(sequence, Volume):
         sequence = [sequence]
     asked = StylizeRun(

@@ -29,12 +29,10 @@ from vnca.recipe.session import (
     ResumeOptions,
     Session,
     TrainingOptions,
-    asked,
     choose_device,
     fitting,
     interrupted,
     run_folder,
-    shown_and_judged,
 )
 from vnca.rule import Rule
 from vnca.rule.model import Model, load_style, nearest_style, style_names
@@ -299,17 +297,17 @@ def run(
         "block": config.block,
         "seed": config.seed,
         "device": str(device),
-        **shown_and_judged(trainer, network),
     }
-    session = Session(
-        command=COMMAND,
-        trainer=trainer,
+    session = Session.begun(
+        options,
+        TextureRun,
+        COMMAND,
+        trainer,
+        network,
         folder=folder,
         style=style,
         training=training,
         inputs=fingerprints(style, config, network, mesh=_surfaces(mesh)),
-        asked=asked(TextureRun, options),
-        preview_every=options.preview_every,
         watch=watch,
     )
     return session.run(checkpoint)

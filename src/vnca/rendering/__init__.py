@@ -6,7 +6,7 @@ The picture is differentiable in the density and colour of the volume.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -284,7 +284,7 @@ def _check(
     if not 0 <= offset < 1:
         raise OptionError(f"offset: expected 0 to less than 1, got {offset}")
     if mode not in ("emission-absorption", "paper"):
-        raise OptionError(f"mode: expected sane or paper, got {mode}")
+        raise OptionError(f"mode: expected emission-absorption or paper, got {mode}")
     if mode == "paper" and step != 1:
         raise OptionError(f"step: the paper's integrand is defined for a step of 1, got {step}")
 
@@ -297,11 +297,8 @@ def projected_velocity(
     *,
     rows: int,
     columns: int,
-    gamma: float,
-    step: float = 1.0,
-    offset: float = 0.0,
-    mode: Mode = "emission-absorption",
     cells_to_world: AnyArray | None = None,
+    **marching: Any,
 ) -> tuple[Float[Tensor, "rows columns 2"], Float[Tensor, "rows columns"]]:
     """What moves in each pixel of a view, and how opaque the pixel is.
 
@@ -314,11 +311,8 @@ def projected_velocity(
         camera: Where to look from, in the space that `cells_to_world` leads to.
         rows: Height of the picture, pixels.
         columns: Width of the picture, pixels.
-        gamma: Extinction of density one, 1/length.
-        step: Length between samples along a ray.
-        offset: Shift of all samples along their rays, in steps.
-        mode: Integrand, see `render`.
         cells_to_world: Where the camera is, see `render`.
+        **marching: `gamma`, `step`, `offset` and `mode` of `render`.
 
     Returns:
         Pixels per frame, to the right and down, zero where nothing is seen; and the opacity.
@@ -339,18 +333,8 @@ def projected_velocity(
     moved = density.new_zeros(*density.shape, 3)
     place = np.eye(4) if cells_to_world is None else cells_to_world
     moved[there] = _pixels(smoke, velocity[there], camera, rows, columns, place)
-    view = render(
-        density,
-        moved,
-        camera,
-        rows=rows,
-        columns=columns,
-        gamma=gamma,
-        step=step,
-        offset=offset,
-        mode=mode,
-        cells_to_world=cells_to_world,
-    )
+    size: dict[str, Any] = {"rows": rows, "columns": columns}
+    view = render(density, moved, camera, **size, cells_to_world=cells_to_world, **marching)
     weight = view.colour[..., 2:]
     return view.colour[..., :2] / weight.clamp_min(1e-6), view.opacity
 

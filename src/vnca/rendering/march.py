@@ -82,14 +82,14 @@ def samples_along(
     if not len(hit):
         return
     longest = int(count.max())
-    reach = _reach(smoke)
+    near_smoke = _near_smoke(smoke)
     for rays in hit.split(max(1, SAMPLES_AT_ONCE // longest)):
         origin, direction = origins[rays, None], directions[rays, None]
         k = first[rays, None] + torch.arange(longest, device=density.device)
         depth = (k + (offset[rays, None] if isinstance(offset, Tensor) else offset)) * step
         points = torch.addcmul(origin, depth[..., None], direction)
         inside = k < (first + count)[rays, None]
-        row, column = torch.nonzero(inside & _look_up(reach, points), as_tuple=True)
+        row, column = torch.nonzero(inside & _look_up(near_smoke, points), as_tuple=True)
         if len(row):
             yield _pack(points[row, column], depth[row, column], row, rays)
 
@@ -127,7 +127,7 @@ def _cross_box(
     return enter, leave
 
 
-def _reach(smoke: Tensor) -> Tensor:
+def _near_smoke(smoke: Tensor) -> Tensor:
     """Whether interpolation between 2×2×2 cells meets smoke: `[x + 1, y + 1, z + 1]`.
 
     Entry `[i, j, k]` stands for the points from (i − 1, j − 1, k − 1) to (i, j, k).
@@ -136,12 +136,13 @@ def _reach(smoke: Tensor) -> Tensor:
     return functional.max_pool3d(padded[None, None], 2, stride=1)[0, 0] > 0
 
 
-def _look_up(reach: Tensor, points: Tensor) -> Tensor:
+def _look_up(near_smoke: Tensor, points: Tensor) -> Tensor:
     x, y, z = (
-        (points[..., axis].floor().long() + 1).clamp_(0, reach.shape[axis] - 1) for axis in range(3)
+        (points[..., axis].floor().long() + 1).clamp_(0, near_smoke.shape[axis] - 1)
+        for axis in range(3)
     )
-    flat = (x * reach.shape[1] + y) * reach.shape[2] + z
-    return reach.view(-1)[flat]
+    flat = (x * near_smoke.shape[1] + y) * near_smoke.shape[2] + z
+    return near_smoke.view(-1)[flat]
 
 
 def sample(field: Float[Tensor, "x y z c"], points: Float[Tensor, "n 3"]) -> Float[Tensor, "n c"]:

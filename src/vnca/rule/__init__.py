@@ -28,7 +28,7 @@ COLOURS = 3
 class Decoder:
     """A network from the interpolated state alone to colour and Δd.
 
-    It is told no place, in its cell or anywhere, so nothing that it draws is tied to the grid.
+    It knows no place, in its cell or anywhere, so nothing that it draws is tied to the grid.
 
     Attributes:
         weights: float32 arrays, as `Weights` has them.
@@ -182,7 +182,7 @@ class RuleConfig:
 
     @property
     def conditioning_width(self) -> int:
-        """Numbers P that a cell is told, those that are switched off among them."""
+        """Numbers P that a cell is conditioned on, those that are switched off among them."""
         return sum(conditioning_named(name).width for name in self.conditioning)
 
     def columns(self, name: str) -> slice | None:

@@ -29,13 +29,13 @@ _SQUARABLE = 1e18
 
 @dataclass(frozen=True)
 class Conditioning:
-    """One input of a rule: some numbers that every cell is told.
+    """One input of a rule: some numbers that every cell is conditioned on.
 
     Attributes:
         name: By which configurations and model files list it.
         width: How many numbers a cell.
-        values: What the cells of a domain are told of a frame, `[n, width]`, from domain, smoke and
-            rule; about as large as 1. It is called once a frame.
+        values: What the cells of a domain are conditioned on in a frame, `[n, width]`, from domain,
+            smoke and rule; about as large as 1. It is called once a frame.
         scale: Of a named field the value that counts as 1; such an input needs nothing but what a
             model file holds. None of what is computed.
     """
@@ -74,8 +74,8 @@ class Conditioning:
                     f"frame {smoke.frame}: the rule is conditioned on {name}, and the smoke has no "
                     "such field; name it in `fields`"
                 )
-            told = field.gather(domain.cells).reshape(len(domain), -1) / scale
-            return told.astype(np.float32)
+            given = field.gather(domain.cells).reshape(len(domain), -1) / scale
+            return given.astype(np.float32)
 
         return cls(name, width, values, scale)
 
@@ -126,7 +126,7 @@ def columns(names: Iterable[str]) -> Mapping[str, slice]:
 
 
 def priors(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
-    """What the cells of a domain are told of a frame: `[n, P]`, the rule's inputs in their order.
+    """What the cells of a domain are conditioned on: `[n, P]`, the rule's inputs in their order.
 
     Inputs that the rule switches off, and velocity where the smoke has none, are zero.
 
@@ -135,25 +135,25 @@ def priors(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
         ShapeError: If a registered input gives another number of values than it says.
     """
     config = rule.config
-    told = np.zeros((len(domain), config.conditioning_width), dtype=np.float32)
+    given = np.zeros((len(domain), config.conditioning_width), dtype=np.float32)
     for name, where in columns(config.conditioning).items():
         if not config.is_conditioned_on(name):
             continue
         values = conditioning_named(name).values(domain, smoke, rule)
-        if values.shape != told[:, where].shape:
+        if values.shape != given[:, where].shape:
             raise ShapeError(
-                f"conditioning {name}: expected {told[:, where].shape} values, got {values.shape}"
+                f"conditioning {name}: expected {given[:, where].shape} values, got {values.shape}"
             )
         if not np.isfinite(values).all():
             raise GridError(f"frame {smoke.frame}: conditioning {name}: not all finite")
-        told[:, where] = values
-    return told
+        given[:, where] = values
+    return given
 
 
 def _position(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
     """(2i + 1)/H − 1, −1 to 1, in the box where the rule was trained.
 
-    What lies outside is told to lie at its border. Of a rule that does not know where that was, it
+    What lies outside counts as at its border. Of a rule that does not know where that was, it
     is the domain's box.
     """
     box, cells = domain.box, domain.cells
@@ -183,9 +183,9 @@ def normalised_velocity(velocity: FloatArray, rule: "Rule") -> FloatArray:
     """
     if not rule.config.velocity_prior:
         return np.zeros_like(velocity)
-    told = np.clip(velocity / rule.scales.velocity, -_SQUARABLE, _SQUARABLE)
-    speed = np.linalg.norm(told, axis=-1, keepdims=True)
-    return told * (SPEED_LIMIT / np.maximum(speed, SPEED_LIMIT))
+    given = np.clip(velocity / rule.scales.velocity, -_SQUARABLE, _SQUARABLE)
+    speed = np.linalg.norm(given, axis=-1, keepdims=True)
+    return given * (SPEED_LIMIT / np.maximum(speed, SPEED_LIMIT))
 
 
 # To give every rule a further input to choose from, list it here.

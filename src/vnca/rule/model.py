@@ -7,6 +7,7 @@ import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
@@ -78,7 +79,7 @@ class Model:
         """
         decoder = self.rule.decoder
         shape = dataclasses.asdict(self.rule.config)
-        listed = list(map(_listed, shape.pop("conditioning")))
+        listed = list(map(listed_conditioning, shape.pop("conditioning")))
         weights = {name: getattr(self.rule, name) for name in _WEIGHTS}
         weights |= dict(zip(_DECODER, decoder.weights, strict=True)) if decoder else {}
         tensors: dict[str, NDArray[Any]] = {
@@ -105,8 +106,13 @@ class Model:
             temporary.write_bytes(save(tensors, metadata=metadata))
 
     @classmethod
-    def load(cls, path: str | Path) -> "Model":
+    def load(cls, path: str | Path, *, to_describe: bool = False) -> "Model":
         """Read a model file, or the model in a run folder.
+
+        Args:
+            path: The file or folder.
+            to_describe: Also read models that are conditioned on what this program cannot compute:
+                they can be looked at, not painted with.
 
         Raises:
             FileFormatError: If the file is missing or empty.
@@ -132,7 +138,7 @@ class Model:
         try:
             described = json.loads(metadata[_METADATA])
             _check_format(path, described["format_version"])
-            conditioning = _conditioning(path, described.get("conditioning"))
+            conditioning = _conditioning(path, described.get("conditioning"), to_describe)
             rule = Rule(
                 **{name: _single_precision(name, tensors[name]) for name in _WEIGHTS},
                 config=replace(
@@ -179,8 +185,10 @@ def _oldest_format(rule: Rule) -> int:
     return 1 if rule.decoder is None else 2
 
 
-def _conditioning(path: Path, record: Any) -> tuple[str, ...]:
+def _conditioning(path: Path, record: Any, to_describe: bool) -> tuple[str, ...]:
     """What a rule is conditioned on; models that do not list it are older than the list.
+
+    To describe a model, what is not known becomes known as what cannot be computed.
 
     Raises:
         ValueError: If it is no list of names, widths and scales.
@@ -198,19 +206,26 @@ def _conditioning(path: Path, record: Any) -> tuple[str, ...]:
         if scale and not is_known(name):
             register_conditioning(Conditioning.of_field(name, width=width, scale=scale[0]))
         elif not is_known(name):
-            raise ModelError(
+            reason = (
                 f"{path}: the rule is conditioned on {name}, which this program does not know; "
                 "make it known with `vnca.register_conditioning` before"
             )
-        if _listed(name) != entry:
+            if not to_describe:
+                raise ModelError(reason)
+            register_conditioning(Conditioning(name, width, partial(_refuse, reason)))
+        if listed_conditioning(name) != entry:
             raise ModelError(
                 f"{path}: the rule is conditioned on {entry} (name, width and scale), and what is "
-                f"known by that name is {_listed(name)}"
+                f"known by that name is {listed_conditioning(name)}"
             )
     return tuple(name for name, *_ in record)
 
 
-def _listed(name: str) -> list[Any]:
+def _refuse(reason: str, *_: Any) -> Any:
+    raise ModelError(reason)
+
+
+def listed_conditioning(name: str) -> list[Any]:
     """An input as a model lists it: its name and width, and the scale of a named field."""
     known = conditioning_named(name)
     return [name, known.width, *([] if known.scale is None else [known.scale])]

@@ -8,8 +8,7 @@ import numpy as np
 from vnca.core import FloatArray, IntArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError
-from vnca.engine import array_decode
-from vnca.engine import numpy as array_reference
+from vnca.engine import array_decode, backend_named
 from vnca.engine.domain import Domain
 from vnca.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, Rule
 
@@ -57,7 +56,7 @@ class Between:
         weights = rule.decoder.weights if rule.decoder is not None else None
         self.has_decoder = weights is not None
         if weights is None:
-            decode = array_reference
+            decode = backend_named("numpy").array_decode()
         self._at = partial(decode.decode, weights=weights)
         self._in_cells = partial(decode.decode_cells, weights=weights)
 

@@ -56,7 +56,7 @@ def test_unpainted_smoke_is_white_and_as_dense_as_it_was(tiny_smoke: Volume, rul
     assert (painting.colour == 1).all()
 
 
-def test_a_portrait_shows_what_is_painted(judge: Judge, tiny_smoke: Volume, rule: Rule) -> None:
+def test_a_preview_shows_what_is_painted(judge: Judge, tiny_smoke: Volume, rule: Rule) -> None:
     blue = coloured(rule, 0.9)
     preview_view = judge.preview_view(paint(blue, tiny_smoke), blue)
     middle = preview_view[len(preview_view) // 2, len(preview_view) // 2]

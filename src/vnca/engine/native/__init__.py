@@ -16,7 +16,7 @@ import numpy as np
 
 from vnca.core import FloatArray, IntArray
 from vnca.core.errors import BackendUnavailableError, OptionError, ShapeError
-from vnca.engine import PRECISIONS, Backend, Compute, Job, Session, StepSession
+from vnca.engine import PRECISIONS, ArrayDecode, Backend, Compute, Job, Session, StepSession
 from vnca.engine.automaton import OUTPUTS, DecoderWeights, Weights, mask_key, mask_threshold
 
 try:
@@ -111,7 +111,7 @@ def forward(
     Args:
         state: `[n + 1, C]`, C at most 64; the last row is the outside, always zero.
         rows: `[m]` cells that change in this step, ascending.
-        neighbours: `[27, n]` rows of the state around each cell; n where nothing lives.
+        neighbours: `[27, n]` rows of the state around each cell; n for the outside.
         priors: `[n, P]`, P at most 16.
         hidden: W1 `[H, 5C + P]`, H at most 512.
         bias: b1 `[H]`.
@@ -227,7 +227,7 @@ def decode(
 
     Args:
         state: `[n + 1, C]`, C from 4 to 64; the last row is the outside, always zero.
-        rows: `[8, m]` rows of the state around each point, z fastest; n where nothing lives.
+        rows: `[8, m]` rows of the state around each point, z fastest; n for the outside.
         fractions: `[m, 3]` of the way from the first of these cells to the last, 0 to 1.
         weights: Of the network, with layers of at most 128 units.
         threads: How many to use; by default one for each core.
@@ -263,21 +263,20 @@ def decode_cells(
     """What is seen at the centres of the `factor`³ parts of each of some cells, not clamped.
 
     Args:
-        state: `[n + 1, C]`, C from 4 to 64; the last row is the outside, always zero.
+        state: As of `decode`.
         cells: `[m]` rows of the cells.
-        neighbours: `[27, n]` rows of the state around each cell; n where nothing lives.
+        neighbours: `[27, n]` rows of the state around each cell; n for the outside.
         factor: Parts along each axis of a cell, at most 8.
-        weights: Of the network, with layers of at most 128 units.
-        threads: How many to use; by default one for each core.
-        instructions: One of `instructions()`; by default the first.
+        weights: As of `decode`.
+        threads: As of `decode`.
+        instructions: As of `decode`.
 
     Returns:
         `[m, factor, factor, factor, 4]`: colour as sRGB − ½, and Δd.
 
     Raises:
-        BackendUnavailableError: If the extension was not built.
-        ShapeError: If arrays are not contiguous, of other shapes or types than above, or hold rows
-            out of range, or the factor is not from 1 to 8.
+        BackendUnavailableError: See `decode`.
+        ShapeError: See `decode`; or if the factor is not from 1 to 8.
     """
     parts = 3 * (max(0, factor),)
     out = np.empty((len(cells), *parts, OUTPUTS), np.float32)
@@ -340,6 +339,16 @@ class NativeBackend(Backend):
         from vnca.engine.native.autograd import update
 
         return partial(update, threads=threads, precision=precision)
+
+    def decode(self, *, threads: int | None = None) -> Callable[..., Any]:
+        """See `Backend.decode`."""
+        from vnca.engine.native.autograd import decode
+
+        return partial(decode, threads=threads)
+
+    def array_decode(self, *, threads: int | None = None) -> ArrayDecode:
+        """See `Backend.array_decode`."""
+        return ArrayDecode(partial(decode, threads=threads), partial(decode_cells, threads=threads))
 
 
 def _update(*arrays: Any, **options: Any) -> FloatArray:

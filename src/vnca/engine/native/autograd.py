@@ -30,7 +30,7 @@ def update(
     Args:
         state: `[n + 1, C]`; the last row is the outside, always zero.
         rows: `[m]` cells that change in this step, int32, ascending.
-        neighbours: `[27, n]` rows of the state around each cell, int32; n where nothing lives.
+        neighbours: `[27, n]` rows of the state around each cell, int32; n for the outside.
         priors: `[n, P]`.
         weights: W1, b1 and W2.
         stencil: `[5, 27]` perception filters.
@@ -89,7 +89,7 @@ def decode(
 
     Args:
         state: `[n + 1, C]`; the last row is the outside, always zero.
-        rows: `[8, m]` rows of the state around each point, z fastest, int32; n where nothing lives.
+        rows: `[8, m]` rows of the state around each point, z fastest, int32; n for the outside.
         fractions: `[m, 3]` of the way from the first of these cells to the last, 0 to 1.
         weights: Of the network.
         threads: How many to use; by default one for each core.

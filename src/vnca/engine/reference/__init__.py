@@ -1,6 +1,7 @@
 """The reference in torch: written to be read, never called by a fast path."""
 
 import importlib.util
+from collections.abc import Callable
 from typing import Any
 
 from vnca.engine import Backend, Compute, Job, Session
@@ -28,6 +29,12 @@ class ReferenceBackend(Backend):
         from vnca.engine.reference.equations import update
 
         return update
+
+    def decode(self, *, threads: int | None = None) -> Callable[..., Any]:
+        """See `Backend.decode`."""
+        from vnca.engine.reference.equations import decode
+
+        return decode
 
 
 BACKEND = ReferenceBackend()

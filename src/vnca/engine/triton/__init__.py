@@ -1,6 +1,7 @@
 """The backend on NVIDIA GPUs."""
 
 import importlib.util
+from collections.abc import Callable
 from typing import Any
 
 from vnca.engine import Backend, Compute, Job, Session
@@ -31,6 +32,12 @@ class TritonBackend(Backend):
         from vnca.engine.triton.step import update
 
         return update
+
+    def decode(self, *, threads: int | None = None) -> Callable[..., Any]:
+        """See `Backend.decode`."""
+        from vnca.engine.triton.decode import decode
+
+        return decode
 
 
 BACKEND = TritonBackend()

@@ -49,7 +49,7 @@ def decode(
     Args:
         state: `[n + 1, C]`, float32, float16 or bfloat16; the last row is the outside, always
             zero. All is computed in float32.
-        rows: `[8, m]` rows of the state around each point, z fastest, int32; n where nothing lives;
+        rows: `[8, m]` rows of the state around each point, z fastest, int32; n for the outside;
             not checked.
         fractions: `[m, 3]` of the way from the first of these cells to the last, 0 to 1.
         weights: Of the network.

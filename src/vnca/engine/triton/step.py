@@ -132,7 +132,7 @@ def update(
         state: `[n + 1, C]`, float32, float16 or bfloat16; the last row is the outside, always
             zero. Products are of numbers of this type, sums are float32.
         rows: `[m]` cells that change in this step, int32, ascending; not checked.
-        neighbours: `[27, n]` rows of the state around each cell, int32; n where nothing lives; not
+        neighbours: `[27, n]` rows of the state around each cell, int32; n for the outside; not
             checked. What is derived from the table is kept with it: do not change it in place.
         priors: `[n, P]`.
         weights: W1, b1 and W2.

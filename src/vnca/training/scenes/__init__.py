@@ -22,7 +22,7 @@ class Scene(ABC, Generic[Viewpoint]):
     """Cells on which states are rolled out and looked at; nothing in it changes.
 
     Attributes:
-        domain: The cells that live.
+        domain: The active cells.
         priors: `[n, P]`, what the rule is conditioned on.
         decoder: What is seen between cells, tensors that can be trained; None where states are
             interpolated.
@@ -141,7 +141,7 @@ def _table(domain: Domain, device: torch.device | str) -> tuple[Tensor, Tensor]:
     """Rows of the state over the box and a cell beyond; and how far apart a point's corners are.
 
     Returns:
-        `[x + 2, y + 2, z + 2]`, n where nothing lives; and `[8, 1]` places in it, laid out flat.
+        `[x + 2, y + 2, z + 2]`, n for the outside; and `[8, 1]` places in it, laid out flat.
     """
     rows = np.full(domain.box.shape, len(domain), np.int32)
     rows.reshape(-1)[domain.places] = np.arange(len(domain), dtype=np.int32)

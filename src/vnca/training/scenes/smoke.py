@@ -99,7 +99,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
             domain = Domain.around_smoke(
                 smoke.density_field,
                 threshold=SMOKE_THRESHOLD * rule.scales.density,
-                reach=rule.config.dilation,
+                dilation=rule.config.dilation,
                 box=box,
             )
         width = view_width(self.box, smoke.index_to_world)

@@ -149,8 +149,8 @@ class Cut(NamedTuple):
 class BlockScene(Scene[list[Cut]]):
     """A block on which states are rolled out and looked at; nothing in it changes.
 
-    All its cells live; it is its own neighbour on every side. Priors are zero: a texture is the
-    same everywhere. Its rule leaves the density alone: smoke painted with it keeps its shape.
+    All its cells are active; it is its own neighbour on every side. Priors are zero: a texture is
+    the same everywhere. Its rule leaves the density alone: smoke painted with it keeps its shape.
     """
 
     paints_density = False
@@ -171,7 +171,7 @@ class BlockScene(Scene[list[Cut]]):
         Args:
             size: Cells along an edge.
             slices: How it is looked at.
-            conditioning_width: Numbers that a cell of the rule is told: all are zero here.
+            conditioning_width: Numbers that a cell is conditioned on: all are zero here.
             mesh: Seen from all sides beside the slices.
             decoder: What is seen between cells; they are interpolated unless given.
             device: Where rollouts and pictures are computed.
