@@ -206,29 +206,54 @@ def test_a_frame_that_disappears_meanwhile(
     assert frames == [f"ball_{number:04d}.vdb" for number in left]
 
 
-@pytest.mark.parametrize(
-    ("on_error", "left"), [("stop", [1]), ("skip", [1, 3]), ("hold", [1, 2, 3])]
-)
-def test_a_frame_that_disappears_between_its_reading_and_its_painting(
+@pytest.fixture
+def while_the_second_is_painted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> Callable[[Callable[[], object]], None]:
+    """Lets something happen between the reading of the second frame and its writing."""
+    paint = Roll.paint
+
+    def patch(event: Callable[[], object]) -> None:
+        def eventful(self: Roll, smoke: Volume, state: RollState) -> Painting:
+            if smoke.frame == 2:
+                event()
+            return paint(self, smoke, state)
+
+        monkeypatch.setattr(Roll, "paint", eventful)
+
+    return patch
+
+
+def test_a_frame_that_disappears_once_it_was_read_is_painted(
     paint: Paint,
     smoke: Path,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    while_the_second_is_painted: Callable[[Callable[[], object]], None],
+) -> None:
+    """It is open still, for the grids that pass through."""
+    assert paint("whole").code == 0
+    while_the_second_is_painted((smoke / "ball_0002.vdb").unlink)
+    assert paint("out").code == 0
+    for name in ("ball_0002.vdb", "ball_0003.vdb"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("on_error", "left"), [("stop", [1]), ("skip", [1, 3]), ("hold", [1, 2, 3])]
+)
+def test_a_frame_that_is_written_to_once_it_was_read_is_broken(
+    paint: Paint,
+    smoke: Path,
+    tmp_path: Path,
+    while_the_second_is_painted: Callable[[Callable[[], object]], None],
     on_error: str,
     left: list[int],
 ) -> None:
-    """The file is read once more, for the grids that pass through."""
-    paint_frame, gone = Roll.paint, smoke / "ball_0002.vdb"
-
-    def eventful(self: Roll, volume: Volume, state: RollState) -> Painting:
-        if volume.frame == 2:
-            gone.unlink()
-        return paint_frame(self, volume, state)
-
-    monkeypatch.setattr(Roll, "paint", eventful)
+    path = smoke / "ball_0002.vdb"
+    while_the_second_is_painted(lambda: path.write_bytes(bytes(path.stat().st_size)))
     outcome = paint("out", "--on-error", on_error)
     assert outcome.code == (2 if on_error == "stop" else 0)
-    assert f"{gone}: no such file" in outcome.err
+    assert f"{path}: has changed while it was painted" in outcome.err
     frames = [name for name in names(tmp_path / "out") if not name.startswith(".")]
     assert frames == [f"ball_{number:04d}.vdb" for number in left]
 

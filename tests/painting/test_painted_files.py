@@ -4,6 +4,7 @@ import tracemalloc
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from vnca.io.sequence import find_frames
 from vnca.io.smoke_format import on_lattice
 from vnca.io.vdb import open_vdb
 from vnca.painting import Painting, Roll, StylizeConfig
+from vnca.recipe import SILENT
+from vnca.recipe.painting import StylizeRun, run
 from vnca.rule import Rule
 from vnca.rule.model import Model
 
@@ -124,3 +127,36 @@ def test_a_far_pair_is_resampled_and_refined_at_its_own_cost(plume: Volume) -> N
         mass = coarser.density_field.values.sum() * (1.25 / 2) ** 3
         assert mass == pytest.approx(2 * plume.density.sum(), rel=0.02)
     assert peaks[1] < 1.1 * peaks[0]
+
+
+def test_a_source_is_opened_once_while_it_is_painted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With `hold` it stays open for longer, and is closed all the same."""
+    opened: list[str] = []
+    files: list[IO[Any]] = []
+    real = Path.open
+
+    def counted(self: Path, *arguments: Any, **keywords: Any) -> IO[Any]:
+        file = real(self, *arguments, **keywords)
+        if self.parent == KEPT and self.suffix == ".vdb":
+            opened.append(self.name)
+            files.append(file)
+        return file
+
+    for on_error in ("stop", "hold"):
+        options = StylizeRun(
+            model=KEPT / "rule.safetensors",
+            sequence=str(KEPT / "plume_%04d.vdb"),
+            out=tmp_path / on_error,
+            on_error=on_error,
+            config=StylizeConfig(warmup=2, steps_per_frame=2),
+        )
+        painting = run(options, SILENT)  # looks at all frames before the first is painted
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "open", counted)
+            written = list(painting)
+        assert sorted(opened) == sorted(frame.name for frame in KEPT.glob("plume_*.vdb"))
+        assert len(written) == len(opened) > 1
+        assert all(file.closed for file in files)
+        opened.clear()

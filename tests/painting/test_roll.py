@@ -168,6 +168,14 @@ def test_reading_ahead_keeps_order_reads_one_ahead_and_passes_errors_on() -> Non
     assert list(read_ahead([])) == []
 
 
+def test_what_was_read_ahead_and_is_not_taken_is_handed_over() -> None:
+    left: list[int] = []
+    results = read_ahead([lambda: 0, lambda: 1, lambda: 2], unwanted=left.append)
+    assert next(results) == 0
+    results.close()
+    assert left == [1]
+
+
 def test_options_out_of_range_are_named() -> None:
     with pytest.raises(OptionError, match="`density_strength`"):
         StylizeConfig(density_strength=1.5)

@@ -31,11 +31,14 @@ from vnca.io.smoke_format import (
     up_axis_of,
     upright_world,
 )
+from vnca.io.vdb import VdbFile, open_vdb
+from vnca.io.vdb_smoke import smoke_in
 from vnca.io.velocity import cells_per_frame, centred, extrapolated, fit_velocity_scale
 
 __all__ = [
     "SmokeFormat",
     "missing_velocity",
+    "open_source",
     "read_smoke",
     "smoke_box",
     "smoke_extent",
@@ -57,7 +60,12 @@ _ANY = SmokeFormat()
 
 
 def read_smoke(
-    path: str | Path, format: SmokeFormat = _ANY, *, frame: int = 0, lattice: Lattice | None = None
+    path: str | Path,
+    format: SmokeFormat = _ANY,
+    *,
+    frame: int = 0,
+    lattice: Lattice | None = None,
+    file: VdbFile | None = None,
 ) -> Volume:
     """A frame over the box of its smoke, up along +z, velocity in cells per frame.
 
@@ -70,6 +78,7 @@ def read_smoke(
         frame: The frame's number.
         lattice: That of its sequence, on whose cells it is wanted. Otherwise it has its own cells,
             counted along the world's axes, which need not be cubic.
+        file: The file itself, if it is open already: see `open_source`.
 
     Raises:
         FileFormatError: If the file cannot be read.
@@ -78,7 +87,7 @@ def read_smoke(
         OptionError: If an option has no meaning.
     """
     path = Path(path)
-    stored = _reader(path).read(path, format)
+    stored = _reader(path).read(path, format) if file is None else smoke_in(file, format)
     density = _non_negative(stored.density, path)
     velocity = None if stored.velocity is None else _velocity(stored.velocity, stored, format, path)
     place, index_to_world = _upright(stored.index_to_world, path, format)
@@ -88,6 +97,17 @@ def read_smoke(
     fields = {name: place.field(held) for name, held in stored.fields.items()}
     smoke = Volume.of_fields(place.field(density), velocity, index_to_world, frame, fields)
     return smoke if lattice is None else on_lattice(smoke, lattice, place.what)
+
+
+def open_source(path: Path) -> VdbFile | None:
+    """A frame's file, open to be read and then copied from, for `read_smoke` and `write_painted`.
+
+    None of a format that has nothing to copy. Close it after use.
+
+    Raises:
+        FileFormatError: If the file cannot be read.
+    """
+    return open_vdb(path) if path.suffix.lower() == ".vdb" else None
 
 
 def smoke_extent(path: Path, format: SmokeFormat) -> Extent:

@@ -1,6 +1,7 @@
 """Writing smoke as VDB files: painted frames of a sequence, and simulated ones."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,7 +24,16 @@ from vnca.io.smoke_format import (
     up_axis_of,
     upright_world,
 )
-from vnca.io.vdb import VALUE_TYPES, Entry, Grid, GridHeader, Transform, open_vdb, write_vdb
+from vnca.io.vdb import (
+    VALUE_TYPES,
+    Entry,
+    Grid,
+    GridHeader,
+    Transform,
+    VdbFile,
+    open_vdb,
+    write_vdb,
+)
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
 
@@ -48,6 +58,7 @@ def write_painted(
     colour_grids: Sequence[str] = COLOUR_GRIDS,
     refine: int = 1,
     provenance: Provenance | None = None,
+    file: VdbFile | None = None,
 ) -> None:
     """Write a frame of a sequence with new density and colour as a VDB file.
 
@@ -71,6 +82,7 @@ def write_painted(
         colour_grids: Names of the colour grids, several to have the colour several times.
         refine: How many times as fine as the source's the painted cells are along each axis.
         provenance: What the file's metadata is to tell of the painting.
+        file: The source itself, if it is a VDB file and open already.
 
     Raises:
         OptionError: If a colour grid is named like the density, or two are named alike.
@@ -93,8 +105,12 @@ def write_painted(
     if not isinstance(colour, Field):
         colour = Field.from_dense(colour, box.lower)
     frame = _Painting(density, colour, lattice, up_axis_of(source, format), refine)
-    write = _paint_vdb if source.suffix.lower() == ".vdb" else _paint_other
-    write(path, source, format, frame, colour_grids, provenance.metadata if provenance else {})
+    told = provenance.metadata if provenance else {}
+    if source.suffix.lower() != ".vdb":
+        _paint_other(path, source, format, frame, colour_grids, told)
+        return
+    with open_vdb(source) if file is None else nullcontext(file) as opened:
+        _paint_vdb(path, opened, format, frame, colour_grids, told)
 
 
 def write_smoke(path: str | Path, volume: Volume) -> None:
@@ -235,52 +251,51 @@ class _Painting:
 
 
 def _paint_vdb(
-    path: str | Path,
-    source: str | Path,
+    path: Path,
+    file: VdbFile,
     format: SmokeFormat,
     frame: _Painting,
     colour_grids: Sequence[str],
     told: Mapping[str, Entry],
 ) -> None:
-    with open_vdb(source) as file:
-        about = {**without_provenance(file.metadata), **told}
-        if not file.grids:
-            write_vdb(path, [], metadata=about)
-            return
-        header, old, cells = read_density(file, format)
-        what = f"{source}: grid {header.name!r}"
-        before, active = old.fields(cells)
-        density, colour = frame.in_file(old.transform, before, what)
-        background = old.tree.background
-        active = frame.active(density, active, background)
-        transform = frame.transform(old.transform)
-        dtype = VALUE_TYPES[old.value_type].dtype
-        if dtype.kind != "f":
-            dtype = np.dtype(np.float32)
-        if old.is_half or dtype.itemsize == 2:
-            density, colour = (
-                replace(field, values=np.clip(field.values, -_HALF_MOST, _HALF_MOST))
-                for field in (density, colour)
-            )
-        density = replace(density, values=density.values.astype(dtype))
-        new = Grid.from_fields(
-            old.name, density, active, like=old, transform=transform, background=background
+    about = {**without_provenance(file.metadata), **told}
+    if not file.grids:
+        write_vdb(path, [], metadata=about)
+        return
+    header, old, cells = read_density(file, format)
+    what = f"{file.path}: grid {header.name!r}"
+    before, active = old.fields(cells)
+    density, colour = frame.in_file(old.transform, before, what)
+    background = old.tree.background
+    active = frame.active(density, active, background)
+    transform = frame.transform(old.transform)
+    dtype = VALUE_TYPES[old.value_type].dtype
+    if dtype.kind != "f":
+        dtype = np.dtype(np.float32)
+    if old.is_half or dtype.itemsize == 2:
+        density, colour = (
+            replace(field, values=np.clip(field.values, -_HALF_MOST, _HALF_MOST))
+            for field in (density, colour)
         )
-        for name in _METADATA_OF_CELLS if frame.refine > 1 else ():
-            new.metadata.pop(name, None)
-        grids: list[Grid | GridHeader] = [
-            new if name == header.name else other
-            for name, other in file.grids.items()
-            if name == header.name or decoded(other.grid_name) not in colour_grids
-        ]
-        shared = {name: old.metadata[name] for name in _SHARED_METADATA if name in old.metadata}
-        grids += [
-            Grid.from_fields(
-                name, colour, active, transform=transform, metadata=shared, half=old.is_half
-            )
-            for name in colour_grids
-        ]
-        write_vdb(path, grids, metadata=about)
+    density = replace(density, values=density.values.astype(dtype))
+    new = Grid.from_fields(
+        old.name, density, active, like=old, transform=transform, background=background
+    )
+    for name in _METADATA_OF_CELLS if frame.refine > 1 else ():
+        new.metadata.pop(name, None)
+    grids: list[Grid | GridHeader] = [
+        new if name == header.name else other
+        for name, other in file.grids.items()
+        if name == header.name or decoded(other.grid_name) not in colour_grids
+    ]
+    shared = {name: old.metadata[name] for name in _SHARED_METADATA if name in old.metadata}
+    grids += [
+        Grid.from_fields(
+            name, colour, active, transform=transform, metadata=shared, half=old.is_half
+        )
+        for name in colour_grids
+    ]
+    write_vdb(path, grids, metadata=about)
 
 
 def _paint_other(

@@ -40,17 +40,22 @@ def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
         GridError: If grids are missing, of the wrong kind, or do not fit together.
     """
     with open_vdb(path) as file:
-        if not file.grids:
-            nothing = Field.from_dense(np.zeros((0, 0, 0), np.float32), (0, 0, 0))
-            return StoredSmoke(nothing, np.eye(4), None)
-        header, grid, box = read_density(file, format)
-        density, _ = _finite(header, grid, box)
-        return StoredSmoke(
-            density,
-            header.transform.index_to_world,
-            _read_velocity(file, format, density, header.transform),
-            {name: _read_field(file, name, density, header.transform) for name in format.fields},
-        )
+        return smoke_in(file, format)
+
+
+def smoke_in(file: VdbFile, format: SmokeFormat) -> StoredSmoke:
+    """As `read_vdb_smoke`, of a file that is open."""
+    if not file.grids:
+        nothing = Field.from_dense(np.zeros((0, 0, 0), np.float32), (0, 0, 0))
+        return StoredSmoke(nothing, np.eye(4), None)
+    header, grid, box = read_density(file, format)
+    density, _ = _finite(header, grid, box)
+    return StoredSmoke(
+        density,
+        header.transform.index_to_world,
+        _read_velocity(file, format, density, header.transform),
+        {name: _read_field(file, name, density, header.transform) for name in format.fields},
+    )
 
 
 def vdb_smoke_extent(path: Path, format: SmokeFormat) -> Extent:

@@ -4,8 +4,9 @@ Of smoke without velocity the user is told once; smoke too thin to be painted is
 densities in another unit than the rule was taught in.
 """
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -20,20 +21,27 @@ from vnca.rule import SMOKE_THRESHOLD, Rule, density_scale
 T = TypeVar("T")
 
 
-def read_ahead(loads: Iterable[Callable[[], T]]) -> Iterator[T]:
+def read_ahead(
+    loads: Iterable[Callable[[], T]], unwanted: Callable[[T], None] | None = None
+) -> Generator[T, None, None]:
     """The results of `loads` in order, each computed in a thread one ahead of its use.
 
     At most two results exist at a time. An exception is raised where its result would have been.
+    `unwanted` is given what was computed and is not taken, as the iterator is closed before.
     """
     with ThreadPoolExecutor(max_workers=1) as reader:
-        pending = None
-        for load in loads:
-            following = reader.submit(load)
-            if pending is not None:
-                yield pending.result()
-            pending = following
-        if pending is not None:
-            yield pending.result()
+        pending: deque[Future[T]] = deque()
+        try:
+            for load in loads:
+                pending.append(reader.submit(load))
+                if len(pending) > 1:
+                    yield pending.popleft().result()
+            if pending:
+                yield pending.popleft().result()
+        finally:
+            for left in pending:
+                if unwanted is not None and left.exception() is None:
+                    unwanted(left.result())
 
 
 @dataclass

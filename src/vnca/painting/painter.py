@@ -4,7 +4,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -21,10 +21,11 @@ from vnca.core.errors import (
 from vnca.core.files import existing_file, remove_file, remove_leftovers
 from vnca.core.lattice import Lattice
 from vnca.core.volume import Volume
-from vnca.io import SmokeFormat, read_smoke, write_painted
+from vnca.io import SmokeFormat, open_source, read_smoke, write_painted
 from vnca.io.provenance import Provenance, read_provenance
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import up_axis_of
+from vnca.io.vdb import VdbFile
 from vnca.painting import Roll, RollState
 from vnca.painting.frames import StillSmoke, read_ahead
 from vnca.painting.unfinished import Source, Unfinished
@@ -39,11 +40,33 @@ _SAVING_SHARE = 0.02
 
 
 class _Read(NamedTuple):
-    """Smoke, as fine as it is painted, and where it is from."""
+    """Smoke, as fine as it is painted, and where it is from: a file that stays open for writing."""
 
     source: Source
     frame: Frame
     smoke: Volume
+    file: VdbFile | None
+
+    def require_unchanged(self) -> None:
+        """Refuse to copy from a file that was written to since it was read.
+
+        Raises:
+            FileFormatError: If it was.
+        """
+        if self.file is not None:
+            status = self.file.status
+            if (status.st_size, status.st_mtime_ns) != self.source[1:]:
+                raise FileFormatError(f"{self.frame.path}: has changed while it was painted")
+
+    def close(self) -> None:
+        """Close the file."""
+        if self.file is not None:
+            self.file.close()
+
+
+def _close(read: _Read | VncaError | None) -> None:
+    if isinstance(read, _Read):
+        read.close()
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,13 +191,20 @@ class Painter:
         """
         sources, state = list(unfinished.sources), unfinished.state
         saved, due, start = len(sources), 0.0, len(sources)
-        held = self._held(sources)
-        for frame, source in zip(self.sequence, sources, strict=False):
-            yield self.target(frame) if source else None
         loads = (partial(self._read, at) for at in range(start, len(self.sequence)))
+        reads = read_ahead(loads, unwanted=_close)
+        held = self._held(sources)
         try:
-            for frame, read in zip(self.sequence[start:], read_ahead(loads), strict=True):
-                held, state, source = self._finish(frame, read, held, state)
+            for frame, source in zip(self.sequence, sources, strict=False):
+                yield self.target(frame) if source else None
+            for frame, read in zip(self.sequence[start:], reads, strict=True):
+                try:
+                    before, (held, state, source) = held, self._finish(frame, read, held, state)
+                finally:
+                    if held is not read:
+                        _close(read)
+                if held is not before:
+                    _close(before)
                 sources.append(source)
                 if time.monotonic() >= due:
                     begun = time.monotonic()
@@ -183,6 +213,8 @@ class Painter:
                     due = ended + (ended - begun) / _SAVING_SHARE
                 yield self.target(frame) if source else None
         finally:
+            reads.close()
+            _close(held)
             if len(sources) > saved:
                 with suppress(OutputError):
                     Unfinished(self.conditions, tuple(sources), state).save(self.unfinished_path)
@@ -214,6 +246,7 @@ class Painter:
         """Paint smoke to the file of a frame; the state after it."""
         self._still.look(read.smoke, read.frame.path)
         painting = self.roll.paint(read.smoke, state)
+        read.require_unchanged()
         if frame == self.sequence[0]:
             # From here on frames of an earlier painting are overwritten, and after an end at any
             # moment it is this one that can be gone on with.
@@ -229,6 +262,7 @@ class Painter:
             colour_grids=self.colour_grids,
             refine=self.refine,
             provenance=self._provenance(read),
+            file=read.file,
         )
         return painting.state
 
@@ -245,21 +279,26 @@ class Painter:
     def _read(self, at: int) -> _Read | VncaError:
         """A frame of the sequence, or what is wrong with it."""
         frame = self.sequence[at]
-        try:
-            source = self._source(at)
-            smoke = read_smoke(
-                frame.path, self.smoke, frame=frame.number, lattice=self.lattice
-            ).refined(self.roll.grid)
-        except BROKEN as error:
-            return error
-        except OSError as error:
-            return FileFormatError(f"{frame.path}: cannot be read ({error.strerror})")
-        if self.roll.box.union(smoke.box) != self.roll.box:
-            return GridError(
-                f"{frame.path}: has changed since the start and now has smoke beyond the box of "
-                "the sequence; start anew"
-            )
-        return _Read(source, frame, smoke)
+        with ExitStack() as opened:
+            try:
+                source = self._source(at)
+                file = open_source(frame.path)
+                if file is not None:
+                    opened.enter_context(file)
+                smoke = read_smoke(
+                    frame.path, self.smoke, frame=frame.number, lattice=self.lattice, file=file
+                ).refined(self.roll.grid)
+            except BROKEN as error:
+                return error
+            except OSError as error:
+                return FileFormatError(f"{frame.path}: cannot be read ({error.strerror})")
+            if self.roll.box.union(smoke.box) != self.roll.box:
+                return GridError(
+                    f"{frame.path}: has changed since the start and now has smoke beyond the box "
+                    "of the sequence; start anew"
+                )
+            opened.pop_all()  # it is closed once the frame is painted
+            return _Read(source, frame, smoke, file)
 
     def _source(self, at: int) -> Source:
         """What a frame of the sequence is painted from, as it is now."""

@@ -105,6 +105,11 @@ class VdbFile:
         """
         return self.header(name).read()
 
+    @property
+    def status(self) -> os.stat_result:
+        """Size and time of change, as they are now: what was opened, whatever its path leads to."""
+        return os.fstat(self._source.stream.fileno())
+
     def close(self) -> None:
         """Close the file; headers stay usable, values no longer are."""
         self._source.stream.close()
