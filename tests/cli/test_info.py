@@ -113,4 +113,4 @@ def test_what_a_model_is_conditioned_on_is_told_also_where_it_is_not_known(
 
 def smoke_of_a_cell() -> Volume:
     one = np.ones((1, 1, 1), np.float32)
-    return Volume(one, None, fields={"temperature": one})
+    return Volume(one, None, (0, 0, 0), np.eye(4), 1, {"temperature": one})
