@@ -1,67 +1,76 @@
-"""Makes the smoke half of the gallery: a film a picture and scene.
+"""Makes the smoke half of the gallery: a film for each style of the library and each scene.
 
-    python docs/gallery/smoke.py WORK
+    python docs/gallery/smoke.py WORK [STYLE ...]
 
-Simulates a plume, jets and a ring. For each of eight pictures, trains a solid texture and then,
-beginning with it, a rule on one frame of the plume; paints and films all three scenes with that
-rule: two of them it never saw. What is in the folder WORK already is not made again. Films go to
-`smoke/`, beside this file, each picture with them, small.
+Simulates a plume, a ring and jets, none of which any of the styles saw in training; paints and
+films them in all styles, or those named. What is in the folder WORK already is not made again.
+Films go to `smoke/`, beside this file, each picture with them, small.
 """
 
 import sys
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import NamedTuple
 
-from workshop import HERE, drawn, made, texture_of
+import numpy as np
+from workshop import HERE, made
 
-from vnca.io.picture import fit, read_image, write_image
+from vnca.core.colour import srgb_to_linear
+from vnca.io.picture import fit, write_image
+from vnca.rule.library import SUFFIX, load_style, style_names
 
 FILMS = HERE / "smoke"
-SCENES = {"plume": (64, 40), "jets": (64, 40), "ring": (64, 40)}
-"""Cells across a scene, and frames."""
-TRAINED = "plume_0030.vdb"
-TRAINING = (
-    *("--preset", "standard", "--iterations", 500, "--no-augment"),
-    *("--hidden", 96, "--appearance.style-scale", 1.2),
-)
-"""The rule is as large as the texture it begins with, and so are patterns, in cells."""
-PAINTINGS = ("vangogh_church_auvers", "vangogh_harvest")
 THUMBNAIL = 200
 """Rows and columns of the picture beside its films."""
-FILM = ("--rows", 200, "--columns", 200, "--film-fps", 12, "--background", "#3c3c42")
+FILM = ("--rows", 240, "--columns", 240, "--film-fps", 12)
 
 
-def main(folder: str) -> None:
+class Scene(NamedTuple):
+    """A simulation, and how it is painted and shown."""
+
+    cells: int
+    frames: int
+    refine: int
+    light: float
+
+
+SCENES = {
+    "plume": Scene(cells=64, frames=40, refine=2, light=0.0),
+    "ring": Scene(cells=64, frames=40, refine=2, light=1.2),
+    "jets": Scene(cells=128, frames=40, refine=1, light=1.2),
+}
+
+
+def main(folder: str, *styles: str) -> None:
     """Make what is missing."""
     work = Path(folder)
     for sub in (work, FILMS):
         sub.mkdir(parents=True, exist_ok=True)
-    for scene, (cells, frames) in SCENES.items():
-        smoke = work / scene
-        last = smoke / f"{scene}_{frames:04d}.vdb"
-        size = ("--resolution", cells, "--frames", frames)
-        made(last, "simulate", scene, "--out", smoke, *size)
-    with as_file(files("vnca.data") / "vangogh_cafe_terrace.webp") as terrace:
-        paintings = [terrace, *(HERE / f"{name}.webp" for name in PAINTINGS)]
-        for picture in [*drawn(work).values(), *paintings]:
-            films_of(picture, work)
+    for name, scene in SCENES.items():
+        last = work / name / f"{name}_{scene.frames:04d}.vdb"
+        size = ("--resolution", scene.cells, "--frames", scene.frames)
+        made(last, "simulate", name, "--out", work / name, *size)
+    for style in styles or style_names():
+        films_of(style, work)
 
 
-def films_of(picture: Path, work: Path) -> None:
-    """Train on the plume, paint all scenes."""
-    name = picture.stem
-    write_image(FILMS / f"{name}.webp", fit(read_image(picture), THUMBNAIL, THUMBNAIL))
-    run = work / f"smoke_{name}"
-    how = ("--init", texture_of(picture, work), *TRAINING)
-    made(run / "model.safetensors", "train", work / "plume" / TRAINED, picture, "--out", run, *how)
-    for scene, (_, frames) in SCENES.items():
-        painted, film = work / f"{name}_{scene}", FILMS / f"{name}_{scene}.webp"
-        last = painted / f"{scene}_{frames:04d}.vdb"
-        some = ("--frames", f"{frames // 4}-{frames}")
-        again = ("--resume", "--overwrite")
-        made(last, "stylize", run, work / scene, "--out", painted, "--refine", 2, *again, *some)
-        made(film, "render", painted, "--out", film, *FILM)
+def films_of(style: str, work: Path) -> None:
+    """Paint and film all scenes in a style."""
+    picture = load_style(style).style
+    assert picture is not None, "a style of the library has its picture"
+    write_image(
+        FILMS / f"{style}.webp",
+        fit(srgb_to_linear(picture / np.float32(255)), THUMBNAIL, THUMBNAIL),
+    )
+    with as_file(files("vnca.data") / "styles" / (style + SUFFIX)) as model:
+        for name, scene in SCENES.items():
+            painted, film = work / f"{style}_{name}", FILMS / f"{style}_{name}.webp"
+            last = painted / f"{name}_{scene.frames:04d}.vdb"
+            how = ("--refine", scene.refine, "--resume", "--overwrite")
+            made(last, "stylize", model, work / name, "--out", painted, *how)
+            shown = ("--frames", f"{scene.frames // 4}-{scene.frames}", "--light", scene.light)
+            made(film, "render", painted, "--out", film, *FILM, *shown)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])
