@@ -369,7 +369,11 @@ def test_a_model_that_is_none(vnca: Vnca, smoke: Path, model: Path, out: Path) -
         path.write_bytes(content)
         assert f"{path}: not a vnca model" in vnca("stylize", model, smoke, "--out", out).complaint
     assert "is it a training run?" in vnca("stylize", smoke, smoke, "--out", out).complaint
-    assert f"{smoke}: this folder holds no" in vnca("info", smoke).complaint
+    (smoke / "._ball_0001.vdb").write_bytes(b"as another system leaves it")
+    one = (
+        f"{smoke}: this folder holds no {MODEL_NAME}; name one of its frames, such as ball_0001.vdb"
+    )
+    assert one in vnca("info", smoke).complaint
 
 
 # Options

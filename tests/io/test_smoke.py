@@ -255,7 +255,12 @@ def spoiled(values: AnyArray, bad: float) -> AnyArray:
         (
             [grid("soot", density()), grid("Cd", vectors())],
             {},
-            r"no density grid 'density'; choose with `density_grid` from soot \(float\), Cd \(vec",
+            r"no density grid 'density'; choose with `density_grid` from soot \(float\)$",
+        ),
+        (
+            [grid("Cd", vectors()), grid("surface", density(), grid_class="level set")],
+            {},
+            r"no density grid 'density'; there is Cd \(vec3s\), surface \(float\), and no other",
         ),
         ([grid("density", vectors())], {}, "holds vectors, expected numbers"),
         (

@@ -308,7 +308,7 @@ def test_velocity_is_found_in_any_case_and_with_any_separator(tmp_path: Path, na
     for spelt in (name, name.capitalize(), name.upper()):
         assert found(named(tmp_path, f"{spelt}!", "Cd!")) == [spelt]
         for separator in (".", "_", ""):
-            for axes in ("xyz", "XYZ"):
+            for axes in ("xyz", "XYZ", "uvw", "UVW"):
                 parts = three(spelt + separator, axes)
                 assert found(named(tmp_path, *reversed(parts), "fuel")) == parts
 
@@ -428,3 +428,17 @@ def test_other_grids_are_no_velocity_but_are_listed(tmp_path: Path) -> None:
         assert listed_vectors(file) == "Cd (vec3s), wind.x with wind.y and wind.z"
     with open_vdb(named(tmp_path, "heat")) as file:
         assert listed_vectors(file) == ""
+
+
+@pytest.mark.parametrize("axes", ["uvw", "UVW"])
+def test_bare_u_v_and_w_may_be_coordinates_of_a_texture_and_have_to_be_chosen(
+    tmp_path: Path, axes: str
+) -> None:
+    path = named(tmp_path, *axes)
+    assert found(path) == []
+    with open_vdb(path) as file:
+        assert listed_vectors(file) == "{} with {} and {}".format(*axes)
+    assert found(path, axes[0]) == [*axes]
+    assert found(named(tmp_path, *axes, "vel!")) == ["vel"]
+    with open_vdb(named(tmp_path, *axes[:2], "w!")) as file:
+        assert listed_vectors(file) == "w (vec3s)"

@@ -1,5 +1,6 @@
 import dataclasses
 import math
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -18,6 +19,7 @@ from vnca.core.volume import Volume
 from vnca.engine import Compute, Job, Session, StepSession
 from vnca.engine.automaton import Automaton, changing_rows, hash_cells
 from vnca.engine.domain import Domain
+from vnca.io.velocity import extrapolated
 from vnca.painting import Painting, Roll, StylizeConfig, stylize
 from vnca.painting.frames import read_ahead
 from vnca.rule import Decoder, Rule, RuleConfig, Scales
@@ -140,6 +142,28 @@ def test_a_roll_goes_on_from_the_state_a_painting_left() -> None:
         again = roll.paint(after.smoke, before.state)
         np.testing.assert_array_equal(again.colour, after.colour)
         assert again.state.steps_done == after.state.steps_done
+
+
+def test_neighbours_are_forgotten_before_colour_is_continued(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They are the largest array there is, and what follows makes others of the same order."""
+    domains: list[weakref.ref[Domain]] = []
+    around_smoke = Domain.around_smoke
+
+    def around(*arguments: Any, **options: Any) -> Domain:
+        domain = around_smoke(*arguments, **options)
+        domains.append(weakref.ref(domain))
+        return domain
+
+    def continued(*arguments: Any) -> Any:
+        assert domains.pop()() is None
+        return extrapolated(*arguments)
+
+    monkeypatch.setattr(Domain, "around_smoke", around)
+    monkeypatch.setattr(roll_module, "extrapolated", continued)
+    rolled([ball(0), ball(1)])
+    assert not domains
 
 
 def test_frames_are_read_one_at_a_time() -> None:

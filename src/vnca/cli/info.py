@@ -77,7 +77,9 @@ def _is_model(path: Path) -> bool:
     """
     if path.is_dir():
         if not (path / MODEL_NAME).exists():
-            raise FileFormatError(f"{path}: this folder holds no {MODEL_NAME}")
+            frames = sorted(file.name for file in path.glob("[!.]*.vdb"))
+            instead = f"; name one of its frames, such as {frames[0]}" if frames else ""
+            raise FileFormatError(f"{path}: this folder holds no {MODEL_NAME}{instead}")
         return True
     existing_file(path)
     suffix = path.suffix.lower()
@@ -158,7 +160,8 @@ def _described_input(name: str) -> str:
 def describe_vdb(path: Path) -> list[str]:
     """Lines about a VDB file: one a grid, then the metadata of the file."""
     with open_vdb(path) as file:
-        lines = [f"OpenVDB file, {len(file.grids) + file.unfound} grids"]
+        count = len(file.grids) + file.unfound
+        lines = [f"OpenVDB file, {count} grid{'s' * (count != 1)}"]
         lines += map(_describe_grid, file.grids.values())
         if file.unfound:
             lines.append(

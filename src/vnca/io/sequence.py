@@ -28,6 +28,7 @@ from vnca.io.smoke_format import suffixes
 MAX_FRAMES = 1_000_000
 _NUMBER = re.compile(r"%0?(?P<printf>\d*)d|\$F(?P<houdini>\d*)|(?P<hashes>#+)")
 _SUB_FRAME_TOKEN = "$FF"
+_IN_A_ROW = "number them all in a row (docs/guide/stylize.md)"  # What else sub-frames can be.
 _BEFORE_MINUS = "._- "
 _TRAILING = re.compile(rf"((?<![^{re.escape(_BEFORE_MINUS)}])-)?\d{{1,18}}\Z", re.ASCII)
 _RANGE = re.compile(r"\s*(-?\d{1,18})(?:\s*-\s*(-?\d{1,18})(?:\s*x\s*(\d{1,18}))?)?\s*", re.ASCII)
@@ -320,7 +321,7 @@ def _one_sequence(
     if len(sequences) > 1:
         shots = {_before_two_numbers(pattern[: pattern.rindex("%")]) for pattern in sequences}
         is_doubtful = len(shots) == 1 and None not in shots
-        also = "; if these are sub-frames, they cannot be used" * is_doubtful
+        also = f"; if these are sub-frames, {_IN_A_ROW}" * is_doubtful
         raise SequenceError(
             f"{path}: several sequences; choose one of {', '.join(sorted(sequences))}{also}"
         )
@@ -334,18 +335,19 @@ def _whole_frames(path: Path, pattern: str, found: list[Frame]) -> str:
     """How whole frames are chosen, those found or those that the pattern finds."""
     if found:
         whole = format_frames(frame.number for frame in found)
-        return f"; choose whole frames with `frames` {whole}"
+        return f"choose whole frames with `frames` {whole}, or "
     folder = path if path.is_dir() else path.parent
     with suppress(SequenceError):
         _matching_number(folder / pattern)
-        return f"; choose whole frames with {pattern}"
-    return "; there are none"
+        return f"choose whole frames with {pattern}, or "
+    return ""
 
 
 def _no_sub_frames(path: Path, files: list[Path], instead: str = "") -> SequenceError:
     more = f" and {len(files) - 1} more" if len(files) > 1 else ""
     return SequenceError(
-        f"{path}: {files[0].name}{more} are sub-frames, and only whole frames can be used{instead}"
+        f"{path}: {files[0].name}{more} are sub-frames, and only whole frames can be used; "
+        f"{instead}{_IN_A_ROW}"
     )
 
 

@@ -94,17 +94,26 @@ def density_header(file: VdbFile, format: SmokeFormat) -> GridHeader:
     """
     name = format.density_grid
     if name not in file.names:
+        fit = [each.name for each in file.grids.values() if _can_be_density(each)]
         raise GridError(
             f"{file.path}: no density grid {name!r}; "
-            f"choose with `density_grid` from {file.listed()}"
+            + (
+                f"choose with `density_grid` from {file.listed(fit)}"
+                if fit
+                else f"there is {file.listed()}, and no other grid of numbers that could be it"
+            )
         )
     header = file.grids[name]
     label = f"{file.path}: density grid {name!r}"
     if components(header) == 3:
         raise GridError(f"{label} holds vectors, expected numbers; choose with `density_grid`")
-    if header.grid_class == "level set":
+    if not _can_be_density(header):
         raise GridError(f"{label} is a level set, expected a fog volume; convert it first")
     return header
+
+
+def _can_be_density(header: GridHeader) -> bool:
+    return components(header) == 1 and header.grid_class != "level set"
 
 
 def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, Box]:

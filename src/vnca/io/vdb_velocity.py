@@ -26,7 +26,7 @@ from vnca.io.vdb.grid import MOST_TILE_CELLS
 from vnca.io.velocity import interpolated
 
 VELOCITY_NAMES = ("velocity", "vel", "v")
-_AXES = ("xyz", "XYZ")
+_AXES = ("xyz", "XYZ", "uvw", "UVW")
 _WAY_OUT = "choose another with `velocity_grid`, or leave it out with `velocity_grid` none"
 _SEPARATORS = (".", "_")
 _BRICKS_AT_ONCE = 128
@@ -114,13 +114,16 @@ def _vectors(file: VdbFile) -> dict[str, GridHeader]:
 
 
 def _triples(file: VdbFile) -> dict[str, tuple[str, str, str]]:
-    """Names that differ in their axis only, by the first: at least one of them is there."""
+    """Names that differ in their axis only, by the first: at least one of them is there.
+
+    Bare u, v and w are three of a kind, too; bare x, y and z are places.
+    """
     triples = {}
     for name, header in file.grids.items():
         for x, y, z in _AXES:
             if components(header) == 1 and name[-1:] in (x, y, z):
                 parts = (name[:-1] + x, name[:-1] + y, name[:-1] + z)
-                if _stem(parts):
+                if _stem(parts) or (x in "uU" and not _missing(file, parts)):
                     triples[parts[0]] = parts
     return triples
 

@@ -114,10 +114,11 @@ def extrapolated(values: Field, known: Field, layers: int) -> tuple[Field, Field
     box, bricks = reached.box, reached.bricks
     inside = replace(reached, values=np.ones_like(reached.values), outside=False).within(box).values
     filled = replace(known, bricks=bricks, values=known.blocks(bricks))
-    result = values.blocks(bricks)
-    result[~filled.values] = 0
-    # The same laid out flat, where a list of cells is much quicker to fetch; and nothing behind.
-    flat = np.concatenate([result.reshape(-1, 3), np.zeros((CELLS, 3), result.dtype)])
+    # Laid out flat, where a list of cells is much quicker to fetch; and nothing behind.
+    flat = np.concatenate(
+        [values.blocks(bricks).reshape(-1, 3), np.zeros((CELLS, 3), values.values.dtype)]
+    )
+    flat[:-CELLS][~filled.values.reshape(-1)] = 0
     is_filled = np.concatenate([filled.values.reshape(-1), np.zeros(CELLS, bool)])
     filled = replace(filled, values=is_filled[:-CELLS].reshape(filled.values.shape))
     beside = {
@@ -135,7 +136,7 @@ def extrapolated(values: Field, known: Field, layers: int) -> tuple[Field, Field
             count += is_filled.take(there)
         flat[front] = total / count[:, None]
         is_filled[front] = True
-    found = flat[:-CELLS].reshape(result.shape)
+    found = flat[:-CELLS].reshape(*filled.values.shape, 3)
     return Field(bricks, found, box), filled
 
 

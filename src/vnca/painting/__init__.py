@@ -10,7 +10,7 @@ Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -131,6 +131,14 @@ class Painting:
         return field_of(self, "colour", self.smoke.origin, outside=UNPAINTED)
 
 
+class _Parts(NamedTuple):
+    """What is painted: cells `[m, 3]`, their linear RGB `[m, 3]`, factors `[m]` of density."""
+
+    at: IntArray
+    colour: FloatArray
+    factors: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class Roll:
     """A rule made ready for a sequence.
@@ -200,32 +208,38 @@ class Roll:
             state: What the frame before it left.
         """
         domain = self._domain(smoke)
-        return self._shown(smoke, domain, self._stepped(smoke, domain, state))
+        state = self._stepped(smoke, domain, state)
+        parts = self._parts(domain, state)
+        del domain  # its table of neighbours is the largest array there is
+        return self._shown(smoke, parts, state)
 
     def _stepped(self, smoke: Volume, domain: Domain, state: RollState) -> RollState:
         """The state after the steps of a frame."""
         rule, config = self.rule, self.config
         if len(domain) == 0:
             return RollState.empty(rule.config.channels, state.steps_done)
-        steps = self.steps_per_frame
-        if len(state.cells) == 0:
-            values, steps = domain.seed(rule.config.channels), config.warmup + steps
-        else:
-            values = Domain(state.cells, domain.box).carry(state.values, domain)
+        warmup = config.warmup if len(state.cells) == 0 else 0
+        done = state.steps_done + warmup + self.steps_per_frame
         conditioning = priors(domain, smoke, rule)
-        done = state.steps_done + steps
         session = open_session(rule.automaton(config.seed), domain, conditioning, self.compute)
-        uploaded = session.upload(values)
-        values = session.read(session.run(uploaded, range(state.steps_done, done)))
-        return RollState(domain.cells, values, done)
+        # What they begin with has no name here, or it would be kept to the last step.
+        values = session.run(
+            session.upload(self._begun(domain, state)), range(state.steps_done, done)
+        )
+        return RollState(domain.cells, session.read(values), done)
 
-    def _shown(self, coarse: Volume, domain: Domain, state: RollState) -> Painting:
+    def _begun(self, domain: Domain, state: RollState) -> FloatArray:
+        """What the cells of a frame begin with, of the state that the one before it left."""
+        if len(state.cells) == 0:
+            return domain.seed(self.rule.config.channels)
+        return Domain(state.cells, domain.box).carry(state.values, domain)
+
+    def _shown(self, coarse: Volume, parts: _Parts, state: RollState) -> Painting:
         """The frame as a state shows it, on the grid of the painting."""
         smoke = coarse.refined(self.finer)
         box = smoke.box
-        at, colour, factors = self._parts(domain, state)
-        inside = ((at >= box.lower) & (at < box.upper)).all(axis=1)
-        at, colour, factors = at[inside], colour[inside], factors[inside]
+        inside = ((parts.at >= box.lower) & (parts.at < box.upper)).all(axis=1)
+        at, colour, factors = parts.at[inside], parts.colour[inside], parts.factors[inside]
         painted = UNPAINTED + self.config.strength * (colour - UNPAINTED)
         colour = Field.from_cells(at, painted, box, outside=UNPAINTED)
         known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
@@ -237,8 +251,8 @@ class Roll:
         colour = replace(colour, outside=UNPAINTED)
         return Painting.of_fields(smoke, density, colour, state, coarse)
 
-    def _parts(self, domain: Domain, state: RollState) -> tuple[IntArray, FloatArray, FloatArray]:
-        """What is painted: cells `[m, 3]`, their linear RGB `[m, 3]`, and factors of density `[m]`.
+    def _parts(self, domain: Domain, state: RollState) -> _Parts:
+        """What is painted.
 
         Of a decoder, each is the mean over a part of a cell: what is finer than the grid of the
         painting would be grain on it.
@@ -246,7 +260,8 @@ class Roll:
         strength = self.config.density_strength
         if self.rule.decoder is None:
             cells = state.values[:-1]
-            return state.cells, colours(cells), density_factors(cells, strength=strength)
+            factors = density_factors(cells, strength=strength)
+            return _Parts(state.cells, colours(cells), factors)
         between = Between(self.rule, self.compute.backend, threads=self.compute.threads)
         parts = self.finer
         colour = np.empty((len(domain), *3 * (parts,), 3), np.float32)
@@ -256,7 +271,8 @@ class Roll:
             factors[some] = density_means(seen, strength=strength)
         offsets = np.indices(3 * (parts,), np.int32).reshape(3, -1).T
         at = (state.cells[:, None] * parts + offsets).reshape(-1, 3)
-        return at.astype(np.int32, copy=False), colour.reshape(-1, 3), factors.reshape(-1)
+        at = at.astype(np.int32, copy=False)
+        return _Parts(at, colour.reshape(-1, 3), factors.reshape(-1))
 
     def _domain(self, smoke: Volume) -> Domain:
         """The active cells of a frame."""

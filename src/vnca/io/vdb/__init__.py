@@ -89,9 +89,10 @@ class VdbFile:
                 return header
         raise GridError(f"{self.path}: no grid {name!r}; the file has {self.listed()}")
 
-    def listed(self) -> str:
-        """The grids with their types, for messages."""
-        grids = [f"{name} ({header.value_type})" for name, header in self.grids.items()]
+    def listed(self, names: Iterable[str] | None = None) -> str:
+        """The grids with their types, all or some, for messages."""
+        names = self.grids if names is None else names
+        grids = [f"{name} ({self.grids[name].value_type})" for name in names]
         if self.unfound:
             grids.append(f"{self.unfound} more that cannot be found behind it, for want of offsets")
         return ", ".join(grids) or "no grid at all"
