@@ -149,6 +149,7 @@ class MotionSupervision(Term):
         if not seen.before.any():
             return {}
         appearance = float(seen.sums["appearance"].detach())
+        assert isinstance(seen.scene, SmokeScene), "only smoke moves"
         loss = self.loss(
             seen.scene,
             seen.before,
