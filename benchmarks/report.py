@@ -184,6 +184,27 @@ def seconds_table(rows: Sequence[Row], case: Sequence[str], columns: Sequence[st
     return lines
 
 
+def kernels_table(rows: Sequence[Row]) -> list[str]:
+    """What each Triton kernel takes of a multiprocessor, on each generation of GPUs."""
+    if not rows:
+        return []
+    lines = [
+        "Registers of a thread and shared memory of a program in KB, with Triton "
+        f"{rows[0]['triton']}; nothing spills:",
+        "",
+        "| kernel | numbers | warps | sm_80 | sm_90 | sm_120 |",
+        "|---|---|---|---|---|---|",
+    ]
+    for (kernel, numbers), found in grouped(rows, "kernel", "numbers").items():
+        by_capability = {row["capability"]: row for row in found}
+        taken = [
+            f"{row['registers']}, {int(row['shared_bytes']) / 1024:.1f}"
+            for row in map(by_capability.__getitem__, ("80", "90", "120"))
+        ]
+        lines.append(f"| {kernel} | {numbers} | {found[0]['warps']} | {' | '.join(taken)} |")
+    return [*lines, ""]
+
+
 def replaced(text: str, name: str, lines: Sequence[str]) -> str:
     """The text with other lines between the markers of that name."""
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
@@ -220,6 +241,7 @@ def main() -> None:
     roofs = drawn("roofline", roofline, step, options.docs, "Rooflines with the backends in them")
     cost = drawn("occupancy", occupancy, sweep, options.docs, "Time against active cells")
     spread = ("seconds_min", "seconds", "seconds_max", "peak_mb")
+    kernels = read(options.results / "gpu_kernels.csv")
     blocks = {
         "roofline": roofs,
         "step": step_table(step),
@@ -235,6 +257,12 @@ def main() -> None:
             ("backend", "dtype", "files", "frames_per_second", *spread),
         ),
     }
+    blocks["gpu_kernels"] = kernels_table(kernels)
+    blocks["paint"] = seconds_table(
+        read(options.results / "paint.csv"),
+        ("device", "threads", "grid", "occupancy", "cells", "steps", "hidden"),
+        ("dtype", *spread[:3], "processor_seconds", "peak_mb", "paper_seconds"),
+    )
     path = options.docs / "kernels.md"
     text = path.read_text()
     for name, lines in blocks.items():

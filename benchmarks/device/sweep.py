@@ -17,14 +17,13 @@ from vnca.bench.contenders import DTYPES, Case, Place, contender
 from vnca.engine.triton import step as triton
 
 CHOICES: dict[str, tuple[Any, ...]] = {
-    "TILE": (32, 64, 128),
+    "TILES": ((64, 32), (32, 32), (128, 32), (64, 64)),
     "PROGRAMS": (2, 3, 4, 6, 8, 16),
     "WARPS": ((4, 8, 4), (8, 8, 4), (4, 4, 4), (4, 8, 8), (4, 8, 2)),
-    "WEIGHT_BYTES": (
-        (1 << 16, 1 << 15),
-        (1 << 15, 1 << 15),
-        (1 << 16, 1 << 14),
-        (1 << 16, 1 << 16),
+    "UNITS": tuple(
+        {4: (forward, backward), 2: (2 * forward, backward)}
+        for forward in (16, 32, 64)
+        for backward in (16, 32, 64)
     ),
 }
 
@@ -49,7 +48,7 @@ def main() -> None:
         torch.set_float32_matmul_precision("high" if dtype == "tf32" else "highest")
         backend = contender(case, "triton", Place("cuda", DTYPES[dtype]), threads=1)
         for name, values in CHOICES.items():
-            for value in dict.fromkeys((usual[name], *values)):
+            for value in (usual[name], *(value for value in values if value != usual[name])):
                 setattr(triton, name, value)
                 row: dict[str, Any] = {"dtype": dtype, "constant": name, "value": value}
                 row |= {

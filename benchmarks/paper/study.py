@@ -18,11 +18,11 @@ from vnca.core import FloatArray
 from vnca.core.errors import OptionError, VncaError
 from vnca.core.files import existing_file, writable_folder
 from vnca.core.volume import Volume
+from vnca.engine.tensors import choose_device
 from vnca.io import SmokeFormat, read_smoke
 from vnca.io.picture import write_image
 from vnca.losses.appearance import AppearanceConfig
 from vnca.recipe import Silent
-from vnca.recipe.session import choose_device
 from vnca.recipe.smoke import SmokeRun
 from vnca.recipe.smoke import run as train
 from vnca.rule import Rule, RuleConfig

@@ -4,10 +4,15 @@ What is named here is the library's face. It is imported when it is first used, 
 `import vnca` is quick and needs neither numpy nor torch.
 """
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+# Before CUDA starts: without it torch 2.8 to 2.10 refuses products of matrices on a GPU that are to
+# be the same in every run, as in training.
+os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
 
 if TYPE_CHECKING:
     from vnca.core import Box

@@ -184,3 +184,29 @@ sys.exit(main(sys.argv[1:]))
     outcome = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert outcome.returncode == 0, outcome.stderr
     assert "frames/s" in outcome.stdout
+
+
+def test_painting_is_told_in_seconds_beside_the_papers(vnca: Vnca, tmp_path: Path) -> None:
+    sizes = ("--grid", "12x20x10", "--occupancy", "0.3", "--frames", "2", "--steps", "2")
+    table = tmp_path / "rows.json"
+    small = (*sizes, "--hidden", "16", "--threads", "1", "--precisions", "float32")
+    outcome = vnca("bench", "paint", *small, "--json", table)
+    assert outcome.code == 0, outcome.err
+    assert "12x20x10 cells" in outcome.out
+    assert "the paper: 0.8 s on an RTX 3090 Ti" in outcome.out
+    assert len(json.loads(table.read_text())["rows"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--grid", "0x1x1"),
+        ("--occupancy", "0"),
+        ("--frames", "1"),
+        ("--steps", "0"),
+        ("--precisions", "float8"),
+        ("--device", "mps"),
+    ],
+)
+def test_what_cannot_be_painted_is_told(vnca: Vnca, option: str, value: str) -> None:
+    assert option in vnca("bench", "paint", option, value).complaint

@@ -4,10 +4,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import vnca.meshes as raster
 from vnca.core import AnyArray
 from vnca.core.camera import Orthographic
-from vnca.meshes import raster
-from vnca.meshes.raster import fragments, visible, weights_at
+from vnca.meshes import fragments, visible, weights_at
 
 
 def covered(corners: AnyArray, rows: int, columns: int) -> AnyArray:

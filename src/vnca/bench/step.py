@@ -9,7 +9,7 @@ compute a hidden layer again, lowers its shares.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 
@@ -27,6 +27,7 @@ from vnca.bench.contenders import (
 )
 from vnca.core import Index
 from vnca.core.errors import OptionError
+from vnca.engine import device_named
 from vnca.engine.automaton import NEIGHBOURS
 from vnca.engine.native import default_threads
 from vnca.rule import PRIORS
@@ -90,14 +91,15 @@ class StepConfig:
     """Of forward, backward and both, which is a forward pass and its gradient."""
     dtypes: tuple[str, ...] = ("float32",)
     """Of float32, tf32 (products may round to 10 bits; on GPUs), float16 and bfloat16."""
-    device: Literal["cpu", "cuda"] = "cpu"
-    """Where to compute."""
+    device: str = "auto"
+    """Where: auto, cpu, cuda, or as cuda:1."""
     threads: int = default_threads()
     """Of the CPU; as many as it has cores unless given."""
     repeats: int = 5
     """How often everything is measured, in turns."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "device", device_named(self.device))
         if min(self.grid) < 1:
             raise OptionError(f"`grid` {'x'.join(map(str, self.grid))}: at least 1x1x1 is needed")
         for name in ("hidden", "threads", "repeats"):
@@ -166,8 +168,6 @@ def prepare(config: StepConfig) -> dict[str, str | int]:
         BackendUnavailableError: If a backend that was named cannot run.
         OptionError: If there is none of that name, or no GPU.
     """
-    if config.device == "cuda" and not torch.cuda.is_available():
-        raise OptionError("`device` cuda: torch finds no NVIDIA GPU; use cpu")
     for dtype in config.dtypes:
         for name in config.backends:
             require(name, dtype, config.device)

@@ -1,6 +1,6 @@
-"""`vnca bench {step,train,stylize}`: what vnca costs on the machine at hand.
+"""`vnca bench {step,train,stylize,paint}`: what vnca costs on the machine at hand.
 
-`vnca bench stylize` is here, and runs without torch.
+`vnca bench stylize` and `vnca bench paint` are here; the former runs without torch.
 """
 
 import math
@@ -27,8 +27,8 @@ from vnca.cli.terminal import Terminal, say
 from vnca.core import Index
 from vnca.core.errors import OptionError
 from vnca.core.files import writable_file
-from vnca.engine import Compute, choose
-from vnca.engine.native import default_threads
+from vnca.engine import PRECISIONS, Compute, choose, device_named
+from vnca.engine.native import default_threads, unavailable
 from vnca.io import SmokeFormat, with_fitted_scale
 from vnca.recipe.sequence import open_sequence
 from vnca.rule.model import Model
@@ -37,11 +37,13 @@ COMMANDS = {
     "step": "time one step of the automaton in every backend",
     "train": "time iterations of training",
     "stylize": "time frames of painting a sequence",
+    "paint": "time frames of the paper's size, from file to file",
 }
 _HOMES = {
     "step": "bench_torch:run_step",
     "train": "bench_torch:run_train",
     "stylize": "bench:run_stylize",
+    "paint": "bench:run_paint",
 }
 
 
@@ -257,3 +259,82 @@ def _table(rows: Rows) -> list[str]:
             f"{short(row['peak_mb']):>8}{gain:>19}"
         )
     return lines
+
+
+@dataclass(frozen=True)
+class BenchPaint(Tables):
+    """Time frames of the paper's size, from file to file, beside the paper's 0.8 s on a GPU.
+
+    A column of smoke moves by a cell a frame, so that in each other cells are active. It is
+    painted by a random rule, which costs what a trained one does.
+    """
+
+    grid: Index = (200, 300, 200)
+    """Cells along x, y and z."""
+    occupancy: float = 0.15
+    """Share of the cells that hold smoke."""
+    frames: int = 3
+    """How many are painted; the first is not counted."""
+    steps: int = 24
+    """Of the automaton in a frame."""
+    hidden: int = 128
+    """Units of the rule."""
+    precisions: tuple[str, ...] = ()
+    """Of float32 and bfloat16; those that the machine has unless given."""
+    device: str = "auto"
+    """Where: auto, cpu, cuda, or as cuda:1."""
+    threads: int = default_threads()
+    """Of the CPU; as many as it has cores unless given."""
+
+    def __post_init__(self) -> None:
+        if min(self.grid) < 1:
+            raise OptionError(f"--grid {'x'.join(map(str, self.grid))}: at least 1x1x1 is needed")
+        if not 0 < self.occupancy <= 1:
+            raise OptionError(f"--occupancy {self.occupancy}: must be over 0 and at most 1")
+        for name, least in (("frames", 2), ("steps", 1), ("hidden", 1), ("threads", 1)):
+            if getattr(self, name) < least:
+                raise OptionError(f"--{name} {getattr(self, name)}: at least {least} is needed")
+        if not set(self.precisions) <= set(PRECISIONS):
+            raise OptionError(
+                f"--precisions {','.join(self.precisions)}: expected of {', '.join(PRECISIONS)}"
+            )
+
+
+def run_paint(arguments: Sequence[str]) -> None:
+    """Measure as asked, print what was found and keep it.
+
+    Raises:
+        VncaError: If something cannot be measured or written.
+    """
+    from vnca.bench.paint import PaintCase, measure_painting  # loads torch
+
+    options = parse_bench("paint", BenchPaint, arguments)
+    options.require_writable()
+    device = device_named(options.device)
+    there = PRECISIONS if device == "cpu" and unavailable("bfloat16") is None else PRECISIONS[:1]
+    facts = run_facts(device, options.threads)
+    case = PaintCase(
+        grid=options.grid,
+        occupancy=options.occupancy,
+        frames=options.frames,
+        steps=options.steps,
+        hidden=options.hidden,
+    )
+    say(f"painting {case.frames} frames of {'x'.join(map(str, case.grid))} cells")
+    chosen = options.precisions or there
+    rows = measure_painting(case, chosen, threads=options.threads, device=device)
+    first = rows[0]
+    options.print("{device}, {threads} threads, vnca {vnca}".format(**facts))
+    options.print(
+        f"{first['grid']} cells, {first['cells']} active, {first['steps']} steps a frame, "
+        f"hidden {first['hidden']}, files included"
+    )
+    for row in rows:
+        spread = f"({short(row['seconds_min'])} to {short(row['seconds_max'])})"
+        options.print(
+            f"{row['dtype']:10}{short(row['seconds']):>8} s a frame {spread}, "
+            f"{short(row['processor_seconds'])} s of processors, at most "
+            f"{short(row['peak_mb'])} MB; "
+            f"the paper: {row['paper_seconds']} s on an RTX 3090 Ti"
+        )
+    options.keep(facts, rows)

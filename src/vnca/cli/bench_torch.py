@@ -18,12 +18,12 @@ from vnca.core import FloatArray
 from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
 from vnca.engine.native import default_threads
+from vnca.engine.tensors import choose_device
 from vnca.features import load_network
 from vnca.io import SmokeFormat, missing_velocity
 from vnca.io.picture import read_style
 from vnca.io.smoke_format import NO_VELOCITY
 from vnca.recipe.sequence import beside, read_alone
-from vnca.recipe.session import choose_device
 from vnca.simulation import simulate
 from vnca.training.config import SmokeConfig
 from vnca.training.presets import DEFAULT, preset
@@ -116,7 +116,7 @@ class BenchTrain(Tables):
     backends: tuple[str, ...] = ()
     """Of plain, compile, reference, native and triton; all that can run here unless given."""
     device: str = "auto"
-    """Where to train: auto, cpu or cuda."""
+    """Where: auto, cpu, cuda, or as cuda:1."""
     memory_budget: str = "auto"
     """As of `vnca train`; with a size, name one backend: all that take part share it."""
     threads: int = default_threads()

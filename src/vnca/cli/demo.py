@@ -64,6 +64,8 @@ class Demo:
     """Another picture to learn from."""
     seed: int = 0
     """Same seed, same machine, same film."""
+    device: str = "auto"
+    """Where: auto, cpu, cuda, or as cuda:1."""
 
 
 def run(arguments: Sequence[str]) -> None:
@@ -95,6 +97,7 @@ def demonstrate(options: Demo) -> None:
             style=style,
             out=run_folder,
             overwrite=True,
+            device=options.device,
             config=_config(options),
         )
         train(asked, watch)
@@ -107,12 +110,15 @@ def demonstrate(options: Demo) -> None:
             preview=film,
             overwrite=True,
             refine=1 if options.quick else 2,
+            device=options.device,
             watch=watch,
         )
         for _ in painting:
             pass
         view = FilmConfig(rows=SHEET_SIZE, columns=SHEET_SIZE)
-        seen = RenderRun(sequence=str(painted), out=sheet, frames=shown, film=view)
+        seen = RenderRun(
+            sequence=str(painted), out=sheet, frames=shown, device=options.device, film=view
+        )
         write_image(sheet, _sheet(picture, seen, watch))
     minutes, seconds = divmod(round(time.monotonic() - start), 60)
     say(f"done in {minutes}:{seconds:02}")

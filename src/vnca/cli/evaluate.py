@@ -16,6 +16,7 @@ from vnca.cli.terminal import Terminal, say
 from vnca.core.errors import GridError, OptionError
 from vnca.core.files import existing_file, whole_file, writable_file
 from vnca.core.volume import Volume
+from vnca.engine.tensors import choose_device
 from vnca.features import load_network
 from vnca.io import SmokeFormat, missing_velocity
 from vnca.io.picture import read_image
@@ -30,7 +31,7 @@ from vnca.metrics.motion import (
 from vnca.painting import StylizeConfig
 from vnca.recipe import evaluation, load, recorded_smoke
 from vnca.recipe.sequence import beside, read_alone
-from vnca.recipe.session import FINGERPRINTS, choose_device
+from vnca.recipe.session import FINGERPRINTS
 from vnca.recipe.smoke import SmokeRun, training_inputs
 from vnca.recipe.smoke import run as train
 from vnca.rule import Rule
@@ -99,7 +100,7 @@ class Ablate:
     size: int = 128
     """Rows and columns of the views that are measured, pixels."""
     device: str = "auto"
-    """Where to train: auto, cpu or cuda."""
+    """Where: auto, cpu, cuda, or as cuda:1."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: SmokeConfig = field(default_factory=SmokeConfig)

@@ -40,11 +40,11 @@ COMMON: Mapping[str, tuple[str, ...]] = {
     ),
     "stylize": (
         *("out", "frames", "refine", "preview", "strength", "density-strength", "gamma", "seed"),
-        *("resume", "overwrite", "on-error", *_SMOKE),
+        *("device", "resume", "overwrite", "on-error", *_SMOKE),
     ),
-    "evaluate": ("out", "frames", "refine", "style", "size", "json"),
+    "evaluate": ("out", "frames", "refine", "style", "size", "device", "json"),
     "ablate": ("out", "preset", "seeds", "iterations", "json", "device", *_SMOKE),
-    "render": (*("out", "frames", "turntable", "strip", "transparent", "gamma", *_FILM),),
+    "render": (*("out", "frames", "turntable", "strip", "transparent", "gamma", "device", *_FILM),),
     "texture train": (
         "out",
         "preset",
@@ -57,6 +57,7 @@ COMMON: Mapping[str, tuple[str, ...]] = {
     ),
     "bench step": ("backends", "threads", "json", "csv"),
     "bench train": ("preset", "backends", "device", "threads", "repeats", "json", "csv"),
+    "bench paint": ("grid", "occupancy", "precisions", "device", "threads", "json", "csv"),
     "bench stylize": ("model", "sequence", "frames", "backends", "threads", "json", "csv"),
 }
 """The options that `--help` shows of a command, in its order; of others it shows all."""

@@ -16,7 +16,7 @@ from vnca.core import FloatArray
 from vnca.core.errors import OptionError
 from vnca.core.files import whole_file, writable_file
 from vnca.core.records import changed_fields
-from vnca.engine import Compute
+from vnca.engine import Compute, compute_of
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.film import FilmWriter
 from vnca.io.mesh import Mesh, read_mesh
@@ -66,6 +66,8 @@ class BlockConfig:
     """Same seed, same machine, same block."""
     backend: str = "auto"
     """What computes the automaton."""
+    device: str = "auto"
+    """Where: auto, cpu, cuda, or as cuda:1."""
 
     def __post_init__(self) -> None:
         Compute(self.backend)
@@ -107,7 +109,7 @@ def grown_blocks(rule: Rule, config: BlockConfig, count: int = 1) -> Iterator[Bl
             steps=config.steps,
             seed=config.seed,
             pause=pause,
-            compute=Compute(config.backend),
+            compute=compute_of(config.backend, config.device),
             watch=lambda: progress.show(next(steps)),
         )
         for _ in range(count):

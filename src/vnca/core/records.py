@@ -1,8 +1,14 @@
-"""Dataclasses with some of their fields given by name: by keywords of Python, or by a file."""
+"""What is given by name, and read if it is what it should be.
+
+Dataclasses with some of their fields given by keywords of Python or by a file; and entries of JSON
+documents, which may hold anything anywhere, most of which numpy takes without a word: a text times
+a whole number is that text many times over, `true` is one, and −1 is the last of a list.
+"""
 
 import ast
 import dataclasses
 import inspect
+import math
 import textwrap
 from collections.abc import Mapping
 from contextlib import suppress
@@ -12,6 +18,9 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+import numpy as np
+
+from vnca.core import AnyArray
 from vnca.core.errors import OptionError
 
 T = TypeVar("T")
@@ -187,3 +196,48 @@ def changed(name: str, default: T, given: T | Mapping[str, Any] | None) -> T:
     if given is None:
         return default
     return with_values(default, given, f"{name}.") if isinstance(given, Mapping) else given
+
+
+def numbers(entry: dict[str, Any], name: str, default: tuple[float, ...]) -> AnyArray:
+    """As many finite numbers as the default has, which stands for a missing list; float64.
+
+    Raises:
+        ValueError: If there is something else.
+    """
+    values = entry.get(name, default)
+    if not (
+        isinstance(values, (list, tuple))
+        and len(values) == len(default)
+        and all(map(_is_number, values))
+    ):
+        raise ValueError(f"its `{name}` should be {len(default)} finite numbers")
+    return np.array(values, np.float64)
+
+
+def number(entry: dict[str, Any], name: str, default: float) -> float:
+    """A finite number; the default where there is none.
+
+    Raises:
+        ValueError: If there is something else.
+    """
+    value = entry.get(name, default)
+    if not _is_number(value):
+        raise ValueError(f"its `{name}` should be a finite number")
+    return float(value)
+
+
+def whole(entry: dict[str, Any], name: str, default: int | None = None) -> int:
+    """A whole number from zero on; the default where there is none.
+
+    Raises:
+        ValueError: If there is something else, or nothing and no default.
+    """
+    value = entry.get(name, default)
+    # JSON knows one kind of numbers: some writers put 3.0.
+    if not _is_number(value) or value != int(value) or value < 0:
+        raise ValueError(f"its `{name}` should be a whole number from 0 on")
+    return int(value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -5,12 +5,16 @@ sessions, which hold state, neighbours, conditioning and mask where they are com
 decodes states, which is chosen together with the step.
 """
 
+import ctypes
+import re
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +26,8 @@ from vnca.engine.domain import Domain
 
 BACKENDS = ("native", "triton", "numpy", "reference")
 """Names of backends, each that of its folder, the fastest on its kind of device first."""
+ON_CPU = ("native", "numpy")
+"""Those that work on the CPU alone."""
 PRECISIONS = ("float32", "bfloat16")
 """What a backend may round the factors of its products to; states and sums stay float32."""
 
@@ -33,7 +39,7 @@ class Compute:
     backend: str = "auto"
     """auto takes the fastest that is there; native, triton, numpy or reference that one."""
     device: str = "cpu"
-    """cpu, cuda, or one of several GPUs, such as cuda:1."""
+    """cpu, cuda, or one of several GPUs, such as cuda:1; see `device_named`."""
     precision: str = "float32"
     """What the native backend rounds the factors of its products to; bfloat16 is quicker where the
     processor has it."""
@@ -248,6 +254,62 @@ class Backend(ABC):
         return backend_named("numpy").array_decode(threads=threads)
 
 
+def device_named(name: str) -> str:
+    """The device of a name, as `Compute` takes it: `cpu`, `cuda` or such as `cuda:1`.
+
+    `auto` is a GPU where torch can compute on one, else the CPU; why it is the CPU although there
+    is a driver for NVIDIA's GPUs is said once on stderr.
+
+    Raises:
+        OptionError: If there is no such device, or torch cannot compute on it.
+    """
+    if name == "cpu":
+        return name
+    if name.partition(":")[0] == "mps":
+        raise OptionError(
+            f"`device` {name}: there are no kernels for Apple's GPUs; the native one works on the "
+            "CPU of a Mac: use cpu"
+        )
+    if not re.fullmatch(r"auto|cuda(:\d{1,3})?", name):
+        raise OptionError(f"`device` {name}: expected auto, cpu, cuda, or such as cuda:1")
+    if find_spec("torch") is None:
+        reason = "it needs torch; install vnca[train]"
+    elif name == "auto" and not _has_driver():
+        return "cpu"
+    else:
+        # Torch takes seconds to import: only where there may be a GPU.
+        reason = import_module("vnca.engine.tensors").why_no_gpu(name.replace("auto", "cuda"))
+    if reason is None:
+        return name.replace("auto", "cuda")
+    if name != "auto":
+        raise OptionError(f"`device` {name}: {reason}; use auto or cpu")
+    if _has_driver():
+        _say_once(f"vnca: computing on the CPU: {reason}")
+    return "cpu"
+
+
+def compute_of(backend: str, device: str, precision: str = "float32") -> Compute:
+    """How to compute as a user asks, where the device may be left to what is there.
+
+    Of backends that work on the CPU alone, `auto` takes that.
+
+    Raises:
+        OptionError: If there is no such device, or torch cannot compute on it.
+    """
+    if device == "auto" and (backend in ON_CPU or precision != "float32"):
+        device = "cpu"
+    return Compute(backend, device_named(device), precision)
+
+
+def _has_driver() -> bool:
+    """Whether a driver is installed without which torch finds no GPU."""
+    for library in ("libcuda.so.1", "nvcuda.dll", "libamdhip64.so"):
+        with suppress(OSError):
+            ctypes.CDLL(library)
+            return True
+    return False
+
+
 def backend_named(name: str) -> Backend:
     """A registered backend, of a name in `BACKENDS`."""
     return import_module(f"vnca.engine.{name}").BACKEND
@@ -315,9 +377,9 @@ def torch_decode(
     """Differentiable decoding of tensors by the backend that would step them.
 
     Args:
-        backend: `auto`, `native`, `triton` or `reference`.
+        backend: `auto`, or one in `BACKENDS` that takes tensors.
         device: Kind of device that holds the state, as torch names it.
-        threads: How many the native kernel uses; the reference uses as many as torch does.
+        threads: How many the native kernel uses.
 
     Raises:
         BackendUnavailableError: If the backend asked for cannot run here.
@@ -327,11 +389,8 @@ def torch_decode(
 
 
 def array_decode(backend: str = "auto", *, threads: int | None = None) -> ArrayDecode:
-    """Decoding of arrays, which takes no torch; arguments and errors are those of `torch_decode`.
-
-    Triton and the reference decode tensors only: where they compute the automaton, `auto` and numpy
-    decode what was read back.
-    """
+    """Decoding of arrays, without torch; arguments and errors are those of `torch_decode`."""
+    # Triton and the reference decode tensors only: what they computed is read back first.
     backend = {"triton": "auto", "reference": "numpy"}.get(backend, backend)
     return choose(Compute(backend)).array_decode(threads=threads)
 

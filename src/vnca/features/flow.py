@@ -205,11 +205,30 @@ def _doubled(field: Tensor) -> Tensor:
 
 
 def _moved_back(picture: Tensor, flow: Tensor) -> Tensor:
-    """`picture` as it was before `flow`: at each pixel, what lies where the pixel goes."""
+    """`picture` `[b, 1, r, c]` as it was before `flow`: at each pixel, what lies where it goes.
+
+    Bilinear; beyond the border its pixels go on. Written out, because on CUDA the gradient of
+    grid_sample adds up in any order, and torch refuses it where runs are to be equal.
+    """
     rows, columns = picture.shape[2:]
     down = torch.arange(rows, dtype=flow.dtype, device=flow.device)[:, None] + flow[:, 1]
     right = torch.arange(columns, dtype=flow.dtype, device=flow.device) + flow[:, 0]
-    grid = torch.stack([(2 * right + 1) / columns - 1, (2 * down + 1) / rows - 1], dim=-1)
-    return functional.grid_sample(
-        picture, grid, mode="bilinear", padding_mode="border", align_corners=False
-    )
+    (above, below, lower), (before, after, further) = _between(down, rows), _between(right, columns)
+    first = torch.arange(len(picture), device=flow.device)[:, None, None] * rows
+    pixels = picture.reshape(-1)
+
+    def row(line: Tensor) -> Tensor:
+        begin = (first + line) * columns
+        left, next_ = (pixels[begin + pixel] for pixel in (before, after))
+        return left + (next_ - left) * further
+
+    upper = row(above)
+    return (upper + (row(below) - upper) * lower)[:, None]
+
+
+def _between(at: Tensor, count: int) -> tuple[Tensor, Tensor, Tensor]:
+    """The pixels of a line of so many that places lie between, and how far from the first."""
+    at = at.clamp(0, count - 1)
+    first = at.detach().floor().clamp_max(max(0, count - 2))
+    place = first.long()
+    return place, (place + 1).clamp_max(count - 1), at - first

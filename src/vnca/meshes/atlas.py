@@ -13,7 +13,7 @@ from vnca.core.errors import BackendUnavailableError, GridError, OptionError
 from vnca.io.mesh import Mesh, Surface
 from vnca.io.mesh.texture import Unwrapping
 from vnca.io.picture import to_srgb8
-from vnca.meshes.raster import fragments, weights_at
+from vnca.meshes import fragments, weights_at
 from vnca.painting.block import Block
 
 Unwrap: TypeAlias = Literal["auto", "always", "never"]

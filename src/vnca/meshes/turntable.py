@@ -10,8 +10,8 @@ from vnca.core.camera import Orthographic, Shot, parse_colour, view_axes
 from vnca.core.errors import OptionError
 from vnca.io.mesh import Mesh
 from vnca.io.mesh.texture import BaseColour, base_colours
+from vnca.meshes import visible
 from vnca.meshes.atlas import Placement
-from vnca.meshes.raster import visible
 from vnca.painting.block import Block
 
 SAMPLES = 2

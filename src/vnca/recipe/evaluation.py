@@ -16,7 +16,7 @@ from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import whole_file, writable_folder
 from vnca.core.lattice import Region
 from vnca.core.volume import Volume
-from vnca.engine import Compute
+from vnca.engine import Compute, compute_of
 from vnca.features import load_network
 from vnca.io import SmokeFormat, with_fitted_scale
 from vnca.io.picture import read_image, style_array
@@ -68,6 +68,9 @@ class EvaluateRun:
     """Rows and columns of the views, pixels."""
     backend: str = "auto"
     """What computes the automaton."""
+    device: str = "auto"
+    """Where the automaton is computed: auto, cpu, cuda, or one of several GPUs, such as cuda:1;
+    pictures are compared on the CPU."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: StylizeConfig = field(default_factory=StylizeConfig)
@@ -129,6 +132,7 @@ def evaluate(
     density_scale: float | None = None,
     size: int = SIZE,
     backend: str = "auto",
+    device: str = "auto",
     watch: Watch = SILENT,
     **options: Any,
 ) -> Evaluation:
@@ -148,6 +152,7 @@ def evaluate(
         density_scale: Density that counts as 1; that of the training frame unless given.
         size: Rows and columns of the views, pixels.
         backend: What computes the automaton.
+        device: Where: `auto`, `cpu`, `cuda`, or such as `cuda:1`; pictures are compared on the CPU.
         watch: Is told how far it has come, and may cancel.
         **options: Fields of `SmokeFormat`, in the place of those that the training recorded, and of
             `StylizeConfig`.
@@ -171,6 +176,7 @@ def evaluate(
         density_scale=density_scale,
         size=size,
         backend=backend,
+        device=device,
         smoke=smoke,
         config=config,
     )
@@ -222,6 +228,7 @@ def run(
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
+    compute = compute_of(options.backend, options.device)
     out = None if options.out is None else writable_folder(options.out)
     picture = _picture(options, model)
     sequence = None
@@ -248,7 +255,7 @@ def run(
         options.config,
         box=given.region.box,
         refine=refine,
-        compute=Compute(options.backend),
+        compute=compute,
     )
     paintings = tracked(paintings, watch, "painting and measuring", given.count, "frames")
     judges = _judges(model, metric, options.size)

@@ -33,7 +33,7 @@ ASKED_NAME = "paint.json"
 MODEL_SUFFIX = ".safetensors"
 LOOKED_AT = 12
 """Frames, at most, of which the one with the most smoke is trained on."""
-_OF_TRAINING = ("preset", "training_frame", "device", "memory_budget")
+_OF_TRAINING = ("preset", "training_frame", "memory_budget")
 _ANY_TIME = ("out", "resume", "overwrite", "device", "memory_budget")
 
 
@@ -61,7 +61,7 @@ class PaintRun:
     seed: int = 0
     """Same seed, same machine, same painting."""
     device: str = "auto"
-    """Where to train: auto, cpu or cuda."""
+    """Where: auto, cpu, cuda, or as cuda:1."""
     memory_budget: str = "auto"
     """Memory for the training, such as 12GB; auto takes what is free."""
     resume: bool = False
@@ -127,7 +127,7 @@ def paint(
         frames: Which frames to paint, such as `30-53`; all unless given.
         refine: Paint on a grid so many times as fine as the smoke's.
         seed: Same seed, same machine, same painting.
-        device: Where to train: `auto`, `cpu` or `cuda`.
+        device: Where to compute: `auto`, `cpu`, `cuda`, or such as `cuda:1`.
         memory_budget: Memory for the training, such as `12GB`.
         resume: Go on where an earlier call was interrupted, or else begin.
         overwrite: Replace what an earlier call left in the folder.
@@ -208,6 +208,7 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
         overwrite=options.overwrite,
         gamma=scales.gamma,
         density_scale=scales.density,
+        device=options.device,
         smoke=smoke,
         config=StylizeConfig(seed=options.seed),
         film=options.film,

@@ -14,7 +14,7 @@ from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import remove_leftovers, writable_file, writable_folder
 from vnca.core.records import changed_fields
 from vnca.core.volume import refined_transform
-from vnca.engine import Compute, choose
+from vnca.engine import Compute, choose, compute_of
 from vnca.io import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.painted import read_colour
@@ -61,6 +61,8 @@ class StylizeRun:
     """Density that counts as 1; that of the training frame unless given."""
     backend: str = "auto"
     """What computes the automaton."""
+    device: str = "auto"
+    """Where: auto, cpu, cuda, or as cuda:1."""
     precision: str = "float32"
     """What the native kernel rounds the factors of its products to; bfloat16 is quicker where the
     processor has it."""
@@ -127,7 +129,7 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
     region = sequence_region(sequence, smoke, watch, without_broken=options.on_error != "stop")
     require_dense_enough(sequence, smoke, rule.scales.density)
     rule = placed(rule, region, watch)
-    compute = Compute(options.backend, precision=options.precision)
+    compute = compute_of(options.backend, options.device, options.precision)
     backend = choose(compute).name
     roll = Roll(rule, options.config, region.box, compute).refined(options.refine)
     facts = _facts(options, model, roll)
@@ -147,6 +149,7 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
             "the place of its cells in the world": region.lattice.to_world.tolist(),
             "the box of the smoke": region.box,
             "`backend`": backend,
+            **({} if compute.device == "cpu" else {"`device`": compute.device_type}),
             "`precision`": options.precision,
             "`density_scale`": rule.scales.density,
             "`gamma`": rule.scales.gamma,
@@ -214,7 +217,10 @@ def _film(options: StylizeRun, painter: Painter, stack: ExitStack, watch: Watch)
     cells = refined_transform(painter.lattice.to_world, painter.roll.grid)
     bounds = region_bounds(painter.roll.box, cells)
     try:
-        film = Film(options.preview, options.film, bounds, frames=len(painter.sequence))
+        device = painter.roll.compute.device
+        film = Film(
+            options.preview, options.film, bounds, frames=len(painter.sequence), device=device
+        )
         return stack.enter_context(film)
     except BackendUnavailableError as error:
         later = f"vnca render {options.out} `out` {options.preview}"

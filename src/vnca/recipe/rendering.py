@@ -14,6 +14,7 @@ from vnca.core import FloatArray
 from vnca.core.errors import OptionError, SequenceError
 from vnca.core.files import existing_file, writable_file
 from vnca.core.records import changed, changed_fields
+from vnca.engine import device_named
 from vnca.io import SmokeFormat
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.film import contact_sheet
@@ -62,6 +63,8 @@ class RenderRun:
     up_axis: UpAxis | None = None
     """Which axis of the file points up; as a painted file tells, else z in VDB files and y in npz
     files, unless given."""
+    device: str = "auto"
+    """Where: auto, cpu, cuda, or as cuda:1."""
     film: FilmConfig = field(default_factory=FilmConfig)
     """The camera."""
 
@@ -127,6 +130,7 @@ def render(
     film: FilmConfig | Mapping[str, Any] | None = None,
     density_grid: str = "density",
     up_axis: UpAxis | None = None,
+    device: str = "auto",
     watch: Watch = SILENT,
 ) -> Path:
     """Make a film, or pictures, of a sequence, painted or not, as `vnca render` does.
@@ -144,6 +148,7 @@ def render(
         density_grid: The grid of the density in files.
         up_axis: Which axis of the files points up; as painted files tell, else by their suffix,
             unless given.
+        device: Where to compute: `auto`, `cpu`, `cuda`, or such as `cuda:1`.
         watch: Is told how far it has come, and may cancel.
 
     Returns:
@@ -163,6 +168,7 @@ def render(
         transparent=transparent,
         density_grid=density_grid,
         up_axis=up_axis,
+        device=device,
         film=changed("film", FilmConfig(), film),
     )
     if isinstance(sequence, (str, Path)):
@@ -261,7 +267,8 @@ def _frames(sequence: FrameSequence, options: RenderRun) -> Iterator[Shown]:
 def _film(shown: Iterator[Shown], frames: int, bounds: Bounds, options: RenderRun) -> None:
     repeats = options.turntable or 1
     config = dataclasses.replace(options.film, turn=360.0) if options.turntable else options.film
-    with Film(options.out, config, bounds, frames=frames * repeats) as film:
+    place = device_named(options.device)
+    with Film(options.out, config, bounds, frames=frames * repeats, device=place) as film:
         for frame in shown:
             for _ in range(repeats):
                 film.add(frame)
@@ -273,7 +280,8 @@ def _pictures(shown: Iterator[Shown], bounds: Bounds, options: RenderRun) -> Non
 
 
 def _picture(frame: Shown, bounds: Bounds, options: RenderRun) -> FloatArray:
-    view = picture(frame, options.film, bounds=bounds, turned=0.0)
+    device = device_named(options.device)
+    view = picture(frame, options.film, bounds=bounds, turned=0.0, device=device)
     image = view.rgba if options.transparent else view.over(behind(options.film))
     return image.cpu().numpy()
 

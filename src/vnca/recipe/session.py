@@ -9,8 +9,6 @@ from pathlib import Path
 from traceback import clear_frames
 from typing import Any, TypeVar
 
-import torch
-
 from vnca.core import FloatArray
 from vnca.core.errors import (
     DivergenceError,
@@ -31,6 +29,8 @@ from vnca.training.run import NoFolder, RunFolder, preview_sheet
 
 FINGERPRINTS = "fingerprints"
 """What says in the configuration of a run what its inputs were, wherever their files lie."""
+"""What tells cuBLAS how much memory to multiply in, and how much runs that are equal may take;
+`import vnca` sets it."""
 THUMBNAIL = 96
 """Rows and columns of the style picture kept in a model file."""
 
@@ -46,7 +46,7 @@ class TrainingOptions:
     preview_every: int = 50
     """Iterations between preview pictures, at which the model is saved too."""
     device: str = "auto"
-    """Where to compute: auto, cpu or cuda."""
+    """Where: auto, cpu, cuda, or as cuda:1."""
     memory_budget: str = "auto"
     """Memory for the program, such as 12GB (on a GPU: of the GPU): what does not fit of a rollout
     is computed again, with the same result. auto takes what is free."""
@@ -364,24 +364,6 @@ def fitting(config: TrainingConfig, what: str) -> Iterator[None]:
             f"out of memory before training began, with {what} and pictures of `{seen.option}` "
             f"{seen.size} pixels; lower it, or take a smaller {what.split()[-1]}"
         ) from error
-
-
-def choose_device(name: str) -> torch.device:
-    """The device of a name; `auto` takes a GPU where there is one.
-
-    Raises:
-        OptionError: If there is no such device.
-    """
-    if name == "auto":
-        name = "cuda" if torch.cuda.is_available() else "cpu"
-    try:
-        device = torch.device(name)
-        torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError) as error:
-        raise OptionError(f"`device` {name}: not available here; use auto or cpu") from error
-    if device.type not in ("cpu", "cuda"):
-        raise OptionError(f"`device` {name}: expected auto, cpu or cuda")
-    return device
 
 
 def _small(style: FloatArray) -> Any:

@@ -6,14 +6,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import GridError, OptionError
 from vnca.core.files import remove_file
 from vnca.core.lattice import Lattice
 from vnca.core.records import distributed
 from vnca.core.volume import Volume
+from vnca.engine.tensors import choose_device, require_equal_runs
 from vnca.features import FeatureNetwork, load_network
 from vnca.io import SmokeFormat, missing_velocity
 from vnca.io.picture import read_style, style_array
@@ -24,7 +23,6 @@ from vnca.recipe.session import (
     ResumeOptions,
     Session,
     TrainingOptions,
-    choose_device,
     fitting,
     interrupted,
     run_folder,
@@ -108,7 +106,7 @@ def train(
         resume: Go on with the training that was interrupted in `out`, with the options that it
             began with, or else begin it.
         preview_every: Iterations between preview pictures.
-        device: `auto`, `cpu` or `cuda`.
+        device: `auto`, `cpu`, `cuda`, or such as `cuda:1`.
         memory_budget: Memory for the program, such as `12GB`.
         terms: Further terms of the loss on smoke, such as one of your own; they are not written
             down, and have to be given again to resume.
@@ -197,7 +195,7 @@ def run(
         config = dataclasses.replace(
             config, rule=dataclasses.replace(config.rule, velocity_prior=False)
         )
-    torch.use_deterministic_algorithms(True)
+    require_equal_runs(device)
     network = load_network(config.features, device)
     with fitting(config, "this frame"):
         budget = memory_budget(options.memory_budget)

@@ -12,7 +12,7 @@ from vnca.core import FloatArray
 from vnca.core.errors import OptionError
 from vnca.core.records import changed
 from vnca.core.volume import Volume
-from vnca.engine import Compute
+from vnca.engine import compute_of
 from vnca.io import with_fitted_scale
 from vnca.io.sequence import find_frames
 from vnca.painting import Painting
@@ -79,6 +79,7 @@ def stylize(
     gamma: float | None = None,
     density_scale: float | None = None,
     backend: str = "auto",
+    device: str = "auto",
     precision: str = "float32",
     resume: bool = False,
     overwrite: bool = False,
@@ -103,6 +104,7 @@ def stylize(
         gamma: Extinction of density 1, per cell of the smoke; that of the training unless given.
         density_scale: Density that counts as 1; that of the training frame unless given.
         backend: What computes the automaton.
+        device: Where to compute: `auto`, `cpu`, `cuda`, or such as `cuda:1`.
         precision: What the native kernel rounds the factors of its products to.
         resume: Go on with a painting in `out` that was ended early.
         overwrite: Replace painted frames that `out` holds; with `resume`, where those are of
@@ -131,6 +133,7 @@ def stylize(
         gamma=gamma,
         density_scale=density_scale,
         backend=backend,
+        device=device,
         precision=precision,
         resume=resume,
         overwrite=overwrite,
@@ -187,7 +190,7 @@ def _in_memory(
         options.config,
         box=region.box,
         refine=options.refine,
-        compute=Compute(options.backend, precision=options.precision),
+        compute=compute_of(options.backend, options.device, options.precision),
     )
     refined = rule.refined(options.refine)
 

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from vnca.core import AnyArray, FloatArray
 from vnca.core.colour import linear_to_srgb
 from vnca.core.errors import OptionError
 from vnca.core.records import distributed
 from vnca.engine.automaton import FILTERS
+from vnca.engine.tensors import choose_device, require_equal_runs
 from vnca.features import load_network
 from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.picture import read_style, style_array
@@ -29,7 +29,6 @@ from vnca.recipe.session import (
     ResumeOptions,
     Session,
     TrainingOptions,
-    choose_device,
     fitting,
     interrupted,
     run_folder,
@@ -229,7 +228,7 @@ def texture(
         preset: `draft` takes minutes, `standard` hours; or the path of a TOML file.
         overwrite: Replace the run that `out` holds.
         preview_every: Iterations between preview pictures.
-        device: `auto`, `cpu` or `cuda`.
+        device: `auto`, `cpu`, `cuda`, or such as `cuda:1`.
         memory_budget: Memory for the program, such as `12GB`.
         watch: Is told how far it has come, and may cancel.
         **options: Fields of `TextureConfig`, in the place of the preset's.
@@ -279,7 +278,7 @@ def run(
     device = choose_device(options.device)
     mesh = read_mesh(options.mesh, options.up_axis) if options.mesh else None
     config = options.config
-    torch.use_deterministic_algorithms(True)
+    require_equal_runs(device)
     network = load_network(config.features, device)
     with fitting(config, "this block"):
         budget = memory_budget(options.memory_budget)

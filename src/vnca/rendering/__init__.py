@@ -17,7 +17,15 @@ from vnca.core import AnyArray
 from vnca.core.camera import Camera
 from vnca.core.errors import OptionError, ShapeError
 from vnca.rendering.light import LightVolume
-from vnca.rendering.march import Samples, gather, paper_weights, ray_weights, sample, samples_along
+from vnca.rendering.march import (
+    Samples,
+    gather,
+    paper_weights,
+    ray_weights,
+    running_sum,
+    sample,
+    samples_along,
+)
 
 Mode = Literal["emission-absorption", "paper"]
 
@@ -217,7 +225,7 @@ def _shaded(
     plain = sample(density, samples.points)
     with torch.no_grad():
         least = samples.table(plain)[..., 0] * (extinction * LEAST_FACTOR)
-        reached = torch.cumsum(least, 1) - least
+        reached = running_sum(least) - least
         seen = ((reached < -math.log(_UNSEEN)) & (least > 0))[samples.row, samples.column]
     factors, hues = shader(samples.points[seen])
     values = torch.cat([plain, plain.new_zeros(len(plain), 3)], -1)
@@ -229,7 +237,7 @@ def _shaded(
 @torch.no_grad()
 def _lit(light: LightVolume, samples: Samples, thickness: Tensor) -> Tensor:
     """What the colours `[rays, samples, 3]` that can be seen are multiplied by; others by one."""
-    reached = torch.cumsum(thickness, 1) - thickness
+    reached = running_sum(thickness) - thickness
     seen = ((reached < -math.log(_UNSEEN)) & (thickness > 0))[samples.row, samples.column]
     factors = thickness.new_ones(len(samples.points))
     factors[seen] = light.at(samples.points[seen])

@@ -207,9 +207,18 @@ def ray_weights(
     Reference: Max 1995, eq. 6; derivation in this folder's README.
     """
     thickness = extinction * step
-    reached = torch.cumsum(thickness, dim=1)
+    reached = running_sum(thickness)
     weights = torch.exp(thickness - reached) * -torch.expm1(-thickness)
     return weights, torch.exp(-thickness.sum(dim=1))
+
+
+def running_sum(values: Float[Tensor, "rays samples"]) -> Float[Tensor, "rays samples"]:
+    """The sum of the samples of each ray up to each of them, itself included. Differentiable."""
+    if not values.is_cuda:
+        return torch.cumsum(values, dim=1)
+    # On CUDA cumsum adds up in any order: torch 2.8 refuses it where runs are to be equal.
+    every = values.new_ones(values.shape[1], values.shape[1])
+    return values @ every.triu()
 
 
 def composite(
@@ -269,7 +278,7 @@ def paper_weights(
         density: max(d (1 + Δd), 0), near to far, one sample a cell.
         gamma: Absorption of one cell of density one.
     """
-    transmittance = torch.exp(-gamma * torch.cumsum(density, dim=1))
+    transmittance = torch.exp(-gamma * running_sum(density))
     return density * transmittance, torch.exp(-gamma * density.sum(dim=1))
 
 

@@ -18,7 +18,7 @@ class TritonBackend(Backend):
             return "it needs torch; install vnca[train]"
         from vnca.engine.triton import step
 
-        return step.unavailable(compute.device_type)
+        return step.unavailable(compute.device)
 
     def session(self, job: Job) -> Session:
         """See `Backend.session`."""

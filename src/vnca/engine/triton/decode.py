@@ -22,13 +22,18 @@ try:
     import triton
 
     from vnca.engine.triton import decode_kernels as triton_kernels
-except ImportError:  # as `vnca.engine.triton.step.unavailable` says
+except (ImportError, AttributeError):  # as `vnca.engine.triton.step.unavailable` says
     triton: Any = None
     triton_kernels: Any = None
 
 TILES = 64, 16, 64
 """Points that a program works on at a time in the forward pass and in the network's gradient, and
 cells in the state's."""
+WARPS = 4, 8, 4
+"""Of 32 threads, in a program of each of them."""
+NETWORK_PRECISION: Precision = "ieee"
+"""Of the network's gradient whatever is asked for: its products are so small that in three parts
+they take more registers than a thread has."""
 MOST_CHANNELS, MOST_UNITS = 32, 32
 """What fits into a multiprocessor together with its gradient."""
 
@@ -81,7 +86,13 @@ class _Decode(torch.autograd.Function):
             sizes = _sizes(tensors, TILES[0])
             with torch.cuda.device_of(state):
                 triton_kernels.forward_kernel[(programs(points, TILES[0], state.device),)](
-                    *tensors, out, points, **sizes, PRECISION=ctx.precision, **OPTIONS
+                    *tensors,
+                    out,
+                    points,
+                    **sizes,
+                    PRECISION=ctx.precision,
+                    num_warps=WARPS[0],
+                    **OPTIONS,
                 )
         return out
 
@@ -112,7 +123,8 @@ class _Decode(torch.autograd.Function):
                     partials,
                     points,
                     **sizes,
-                    PRECISION=ctx.precision,
+                    PRECISION=NETWORK_PRECISION,
+                    num_warps=WARPS[1],
                     **OPTIONS,
                 )
                 triton_kernels.state_kernel[(triton.cdiv(cells + 1, TILES[2]),)](
@@ -126,6 +138,7 @@ class _Decode(torch.autograd.Function):
                     sizes["C"],
                     sizes["WIDTH"],
                     TILES[2],
+                    num_warps=WARPS[2],
                     **OPTIONS,
                 )
         parts = partials.sum(0).split(lengths)

@@ -15,11 +15,46 @@ import triton.language as tl
 
 
 @triton.jit
+def _reduced(x):
+    """Whether q is odd, and r, of x = qπ + r with |r| ≤ π/2.
+
+    π is taken in three parts, the first of 8 and the second of 9 bits; q times them is exact.
+    """
+    # So far out floats are nearly a period apart: zero. Infinity becomes no number.
+    x = tl.where(tl.abs(x) > 1e7, x - x, x)
+    q = tl.floor(x * 0.318309886 + 0.5)
+    r = ((x - q * 3.140625) - q * 9.670257568359375e-4) - q * 6.278329573e-7
+    return (q.to(tl.int32) & 1) == 1, r
+
+
+# Those of Triton's library have a way for arguments of any size that takes all registers there are.
+@triton.jit
+def _sine(x):
+    """Within 2e-7 up to 10⁵; see DECODE.md."""
+    is_odd, r = _reduced(x)
+    square = r * r
+    odd = square * (2.6000246e-6 * square - 1.98066016e-4)
+    odd = square * (square * (odd + 8.3330171e-3) - 0.166666567)
+    value = r + r * odd
+    return tl.where(is_odd, -value, value)
+
+
+@triton.jit
+def _cosine(x):
+    is_odd, r = _reduced(x)
+    square = r * r
+    even = square * (-2.61935497e-7 * square + 2.47692915e-5)
+    even = square * (square * (even - 1.38885691e-3) + 4.16666567e-2) - 0.5
+    value = 1 + square * even
+    return tl.where(is_odd, -value, value)
+
+
+@triton.jit
 def _share(fractions, point, inside, corner):
     """What a corner, z fastest, counts at some points."""
     x = tl.load(fractions + 3 * point, mask=inside, other=0).to(tl.float32)
-    y = tl.load(fractions + 3 * point + 1, mask=inside, other=0).to(tl.float32)
-    z = tl.load(fractions + 3 * point + 2, mask=inside, other=0).to(tl.float32)
+    y = tl.load(fractions + (3 * point + 1), mask=inside, other=0).to(tl.float32)
+    z = tl.load(fractions + (3 * point + 2), mask=inside, other=0).to(tl.float32)
     x = tl.where((corner & 4) != 0, x, 1 - x)
     y = tl.where((corner & 2) != 0, y, 1 - y)
     z = tl.where((corner & 1) != 0, z, 1 - z)
@@ -33,8 +68,8 @@ def _interpolate(state, rows, fractions, points, at, inside, C: tl.constexpr, WI
     wanted = inside[:, None] & (channels < C)
     total = tl.zeros([at.shape[0], WIDTH], tl.float32)
     for corner in tl.static_range(8):
-        row = tl.load(rows + corner * points + at, mask=inside, other=0)
-        s = tl.load(state + row[:, None] * C + channels, mask=wanted, other=0).to(tl.float32)
+        row = tl.load(rows + (corner * points + at), mask=inside, other=0)
+        s = tl.load(state + (row[:, None] * C + channels), mask=wanted, other=0).to(tl.float32)
         total += _share(fractions, at, inside, corner)[:, None] * s
     return total
 
@@ -45,7 +80,7 @@ def _transposed(weights, INPUTS, OUTPUTS, FROM: tl.constexpr, TO: tl.constexpr):
     i = tl.arange(0, FROM)[:, None]
     o = tl.arange(0, TO)[None, :]
     wanted = (i < INPUTS) & (o < OUTPUTS)
-    return tl.load(weights + o * INPUTS + i, mask=wanted, other=0).to(tl.float32)
+    return tl.load(weights + (o * INPUTS + i), mask=wanted, other=0).to(tl.float32)
 
 
 @triton.jit
@@ -116,11 +151,11 @@ def forward_kernel(
         at = tile * TILE + tl.arange(0, TILE)
         inside = at < points
         s = _interpolate(state, rows, fractions, points, at, inside, C, WIDTH)
-        h = tl.sin(tl.dot(s, w1, input_precision=PRECISION) + b1)
-        h = tl.sin(tl.dot(h, w2, input_precision=PRECISION) + b2)
-        h = tl.sin(tl.dot(h, w3, input_precision=PRECISION) + b3)
+        h = _sine(tl.dot(s, w1, input_precision=PRECISION) + b1)
+        h = _sine(tl.dot(h, w2, input_precision=PRECISION) + b2)
+        h = _sine(tl.dot(h, w3, input_precision=PRECISION) + b3)
         h = s + tl.dot(h, w4, input_precision=PRECISION) + b4
-        to = out + at[:, None] * 4 + seen
+        to = out + (at[:, None] * 4 + seen)
         tl.store(to, h.to(out.dtype.element_ty), mask=inside[:, None] & (seen < 4))
 
 
@@ -129,7 +164,7 @@ def _store(to, INPUTS, OUTPUTS, values, FROM: tl.constexpr, TO: tl.constexpr):
     """Store `values` `[FROM, TO]` as `[INPUTS, OUTPUTS]`."""
     i = tl.arange(0, FROM)[:, None]
     o = tl.arange(0, TO)[None, :]
-    tl.store(to + i * OUTPUTS + o, values, mask=(i < INPUTS) & (o < OUTPUTS))
+    tl.store(to + (i * OUTPUTS + o), values, mask=(i < INPUTS) & (o < OUTPUTS))
 
 
 @triton.jit
@@ -167,8 +202,6 @@ def network_kernel(
     Writes the latter to `to_between` `[m, C]`, and a program's sums to `partials` `[programs, …]`:
     weights, transposed, and bias of each layer in turn.
     """
-    w1, w2, w3, w4 = _matrices(first, second, third, output, C, H, WIDTH, UNITS)
-    b1, b2, b3 = _hidden_biases(first_bias, second_bias, third_bias, H, UNITS)
     to_w1 = tl.zeros([WIDTH, UNITS], tl.float32)
     to_w2 = tl.zeros([UNITS, UNITS], tl.float32)
     to_w3 = tl.zeros([UNITS, UNITS], tl.float32)
@@ -182,28 +215,47 @@ def network_kernel(
         at = tile * TILE + tl.arange(0, TILE)
         inside = at < points
         s = _interpolate(state, rows, fractions, points, at, inside, C, WIDTH)
-        a1 = tl.dot(s, w1, input_precision=PRECISION) + b1
-        h1 = tl.sin(a1)
-        a2 = tl.dot(h1, w2, input_precision=PRECISION) + b2
-        h2 = tl.sin(a2)
-        a3 = tl.dot(h2, w3, input_precision=PRECISION) + b3
-        h3 = tl.sin(a3)
+        # Weights come from cache when they are multiplied. Barriers keep the compiler from fetching
+        # those of later products beforehand, for which there are not enough registers.
+        w = _transposed(first, C, H, WIDTH, UNITS)
+        a1 = tl.dot(s, w, input_precision=PRECISION) + _bias(first_bias, H, UNITS)
+        h1 = _sine(a1)
+        tl.debug_barrier()
+        w = _transposed(second, H, H, UNITS, UNITS)
+        a2 = tl.dot(h1, w, input_precision=PRECISION) + _bias(second_bias, H, UNITS)
+        h2 = _sine(a2)
+        tl.debug_barrier()
+        w = _transposed(third, H, H, UNITS, UNITS)
+        a3 = tl.dot(h2, w, input_precision=PRECISION) + _bias(third_bias, H, UNITS)
+        h3 = _sine(a3)
+        tl.debug_barrier()
 
         wanted = inside[:, None] & (channels < 4)
-        g = tl.load(gradient + at[:, None] * 4 + channels, mask=wanted, other=0).to(tl.float32)
+        g = tl.load(gradient + (at[:, None] * 4 + channels), mask=wanted, other=0).to(tl.float32)
         to_w4 = tl.dot(tl.trans(h3), g, to_w4, input_precision=PRECISION)
         to_b4 += tl.sum(g, 0)
-        to_a = tl.dot(g, tl.trans(w4), input_precision=PRECISION) * tl.cos(a3)
+        tl.debug_barrier()
+        w = _transposed(output, H, 4, UNITS, WIDTH)
+        to_a = tl.dot(g, tl.trans(w), input_precision=PRECISION) * _cosine(a3)
+        tl.debug_barrier()
         to_w3 = tl.dot(tl.trans(h2), to_a, to_w3, input_precision=PRECISION)
         to_b3 += tl.sum(to_a, 0)
-        to_a = tl.dot(to_a, tl.trans(w3), input_precision=PRECISION) * tl.cos(a2)
+        tl.debug_barrier()
+        w = _transposed(third, H, H, UNITS, UNITS)
+        to_a = tl.dot(to_a, tl.trans(w), input_precision=PRECISION) * _cosine(a2)
+        tl.debug_barrier()
         to_w2 = tl.dot(tl.trans(h1), to_a, to_w2, input_precision=PRECISION)
         to_b2 += tl.sum(to_a, 0)
-        to_a = tl.dot(to_a, tl.trans(w2), input_precision=PRECISION) * tl.cos(a1)
+        tl.debug_barrier()
+        w = _transposed(second, H, H, UNITS, UNITS)
+        to_a = tl.dot(to_a, tl.trans(w), input_precision=PRECISION) * _cosine(a1)
+        tl.debug_barrier()
         to_w1 = tl.dot(tl.trans(s), to_a, to_w1, input_precision=PRECISION)
         to_b1 += tl.sum(to_a, 0)
-        to_s = g + tl.dot(to_a, tl.trans(w1), input_precision=PRECISION)
-        to = to_between + at[:, None] * C + channels
+        tl.debug_barrier()
+        w = _transposed(first, C, H, WIDTH, UNITS)
+        to_s = g + tl.dot(to_a, tl.trans(w), input_precision=PRECISION)
+        to = to_between + (at[:, None] * C + channels)
         tl.store(to, to_s, mask=inside[:, None] & (channels < C))
 
     to = partials + tl.program_id(0) * ((C + 1) * H + 2 * (H + 1) * H + (H + 1) * 4)

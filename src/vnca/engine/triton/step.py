@@ -1,6 +1,7 @@
 """The step on NVIDIA GPUs in torch's automatic differentiation, computed by Triton kernels."""
 
 from collections.abc import Callable, Collection, Mapping
+from functools import cache
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -13,15 +14,17 @@ from vnca.core.errors import ShapeError
 from vnca.engine.automaton import FILTERS, NEIGHBOURS
 from vnca.engine.automaton import stencil as filters
 from vnca.engine.reference.equations import Weights
+from vnca.engine.tensors import changing_rows, why_no_gpu
 
 try:
     import triton
     from triton import knobs
 
-    from vnca.engine.triton import step_kernels
-except ImportError as error:
+    from vnca.engine.triton import gradient_kernels, step_kernels
+except (ImportError, AttributeError) as error:  # another Triton may lack what kernels need
     triton: Any = None
     step_kernels: Any = None
+    gradient_kernels: Any = None
     _missing = str(error)
     _interpreted = False
 else:
@@ -33,15 +36,24 @@ Precision = Literal["ieee", "tf32x3", "tf32"]
 """Products of float32: exact, as three products on tensor cores (nearly so), as one (10 bits)."""
 PROGRAMS = 4
 """Programs for each multiprocessor; they take tiles of changing cells, or of points, in turns."""
-TILE = 64
-"""Cells that a program works on at a time, if their channels are 16 or fewer."""
+TILES = 64, 32
+"""Cells that a program works on at a time in the forward and the backward pass, if their channels
+are 16 or fewer."""
 WARPS = 4, 8, 4
 """Of 32 threads, in a program of the forward pass, the weights' gradient and the state's."""
-WEIGHT_BYTES = 1 << 16, 1 << 15
-"""What the weights of the hidden units that a program works on at a time may take in a
-multiprocessor's shared memory, in the forward and the backward pass; at most 128 of them."""
+UNITS = {4: (32, 32), 2: (64, 32)}
+"""Hidden units whose weights a program works on at a time in the forward and the backward pass, if
+channels are 16 or fewer, by the bytes of a number. More take more registers than a thread has."""
+GRADIENT_PRECISION: Precision = "ieee"
+"""Of float32 products in the weights' gradient whatever is asked for: on tensor cores they take
+more registers, too."""
 TYPES = (torch.float32, torch.float16, torch.bfloat16)
 OPTIONS: dict[str, Any] = {"num_stages": 1, "enable_fp_fusion": True}
+FORWARD_OPTIONS: dict[str, Any] = {**OPTIONS, "maxnreg": 255}
+"""Of the forward kernel, which may take all registers of a thread: by itself, the assembler for
+`sm_80` gives it half of them, and spills. Given to other kernels, too, this makes those spill."""
+LOWEST_CAPABILITY = (8, 0)
+"""Compute capability from which on GPUs multiply tf32 and bfloat16."""
 MOST_CHANNELS, MOST_PRIORS = 64, 31
 """What fits into a multiprocessor."""
 LARGEST = 2**31 - 1
@@ -100,15 +112,38 @@ def _looks_back(there: Tensor, back: Tensor, cells: Tensor) -> Tensor:
 
 
 def unavailable(device: str) -> str | None:
-    """Why the Triton kernels cannot run on a kind of device, or nothing if they can."""
+    """Why the Triton kernels cannot run on a device, or nothing if they can."""
     if _missing is not None:
         return f"the package triton is not installed, or does not load ({_missing})"
     if _interpreted:
         return None
-    if device != "cuda":
+    if not device.startswith("cuda"):
         return f"the Triton kernels work on NVIDIA GPUs, not on {device}"
-    if not torch.cuda.is_available():
-        return "torch finds no NVIDIA GPU"
+    if torch.version.hip is not None:
+        return "the Triton kernels work on NVIDIA GPUs, not on AMD's"
+    return why_no_gpu(device) or _why_no_kernel()
+
+
+@cache
+def _why_no_kernel() -> str | None:
+    """Why Triton, C compiler and driver cannot run a kernel here, or nothing if they can."""
+    capability = torch.cuda.get_device_capability()
+    if capability < LOWEST_CAPABILITY:
+        name, needed = torch.cuda.get_device_name(), LOWEST_CAPABILITY
+        return (
+            f"{name} has compute capability {capability[0]}.{capability[1]}, and the Triton "
+            f"kernels need {needed[0]}.{needed[1]}"
+        )
+    hashes = torch.arange(1000, dtype=torch.int32)
+    drawn = {"seed": 1, "step": 2, "probability": 0.5}
+    versions = f"triton {triton.__version__} with torch {torch.__version__}"
+    try:
+        found = step_kernels.changing_rows(hashes.cuda(), **drawn).cpu()
+    except Exception as error:  # Triton's compiler, the C compiler's and the driver's are many
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        return f"{versions} cannot run a kernel on this GPU ({lines[0][:200]})"
+    if not torch.equal(found, changing_rows(hashes, **drawn)):
+        return f"{versions} computes wrongly on this GPU"
     return None
 
 
@@ -164,7 +199,7 @@ class _Update(torch.autograd.Function):
         if len(rows) == 0:
             return state.clone()
         out = torch.empty_like(state)
-        sizes = _sizes(state, tensors[3], tensors[4], WEIGHT_BYTES[0])
+        sizes = _sizes(state, tensors[3], tensors[4], backward=False)
         with torch.cuda.device_of(state):
             count = programs(len(rows), sizes["TILE"], rows.device)
             step_kernels.forward_kernel[(count,)](
@@ -176,7 +211,7 @@ class _Update(torch.autograd.Function):
                 **sizes,
                 PRECISION=ctx.precision,
                 num_warps=WARPS[0],
-                **OPTIONS,
+                **FORWARD_OPTIONS,
             )
         return out
 
@@ -190,33 +225,51 @@ class _Update(torch.autograd.Function):
         state, rows, neighbours, priors, *weights = tensors
         hidden = weights[0]
         n, channels, units = neighbours.shape[1], state.shape[1], len(hidden)
-        sizes = _sizes(state, priors, hidden, WEIGHT_BYTES[1])
+        sizes = _sizes(state, priors, hidden, backward=True)
         count = programs(len(rows), sizes["TILE"], rows.device)
         # Unsummed gradients of W1ᵀ, b1 and W2, one below the other.
         partials = state.new_empty(
             (count, hidden.shape[1] + 1 + channels, units), dtype=torch.float32
         )
-        to_perceived = state.new_empty(len(rows), FILTERS * channels)
+        perceived = state.new_empty(len(rows), FILTERS * channels)
+        to_perceived = torch.zeros_like(perceived)
         place = torch.full((n,), -1, dtype=torch.int32, device=state.device)
         to_state = torch.empty_like(state)
         with torch.cuda.device_of(state):
             if count:
-                step_kernels.weights_kernel[(count,)](
-                    *tensors,
-                    gradient,
-                    to_perceived,
-                    place,
-                    partials,
+                few = {name: sizes[name] for name in ("C", "WIDTH", "TILE")}
+                gradient_kernels.perceive_kernel[(triton.cdiv(len(rows), few["TILE"]),)](
+                    state,
+                    rows,
+                    neighbours,
+                    perceived,
                     n,
                     len(rows),
                     ctx.scales,
-                    **sizes,
-                    PRECISION=ctx.precision,
-                    num_warps=WARPS[1],
+                    **few,
+                    num_warps=WARPS[2],
                     **OPTIONS,
                 )
+                for portion in range(0, units, sizes["UNITS"]):
+                    gradient_kernels.weights_kernel[(count,)](
+                        perceived,
+                        rows,
+                        priors,
+                        *weights,
+                        gradient,
+                        to_perceived,
+                        place,
+                        partials,
+                        len(rows),
+                        portion,
+                        ctx.scales,
+                        **sizes,
+                        PRECISION=GRADIENT_PRECISION,
+                        num_warps=WARPS[1],
+                        **OPTIONS,
+                    )
             tile = sizes["TILE"]
-            step_kernels.state_kernel[(triton.cdiv(n + 1, tile),)](
+            gradient_kernels.state_kernel[(triton.cdiv(n + 1, tile),)](
                 gradient,
                 to_perceived,
                 place,
@@ -238,12 +291,12 @@ class _Update(torch.autograd.Function):
         return to_state, None, None, None, *to_weights, None, None, None
 
 
-def _sizes(state: Tensor, priors: Tensor, hidden: Tensor, weight_bytes: int) -> dict[str, int]:
-    """What the kernels are compiled for."""
+def _sizes(state: Tensor, priors: Tensor, hidden: Tensor, *, backward: bool) -> dict[str, int]:
+    """What the kernels of a pass are compiled for."""
     width = max(16, triton.next_power_of_2(state.shape[1]))
     prior_width = max(16, triton.next_power_of_2(priors.shape[1] + 1))
-    units = weight_bytes // ((FILTERS + 1) * width + prior_width) // state.element_size()
-    units = min(128, 1 << (units.bit_length() - 1), triton.next_power_of_2(len(hidden)))
+    units = 16 * UNITS[state.element_size()][backward] // width
+    units = min(units, triton.next_power_of_2(len(hidden)))
     return {
         "C": state.shape[1],
         "P": priors.shape[1],
@@ -251,7 +304,7 @@ def _sizes(state: Tensor, priors: Tensor, hidden: Tensor, weight_bytes: int) -> 
         "WIDTH": width,
         "PRIOR_WIDTH": prior_width,
         "UNITS": max(16, units),
-        "TILE": max(16, 16 * TILE // width),
+        "TILE": max(16, 16 * TILES[backward] // width),
     }
 
 

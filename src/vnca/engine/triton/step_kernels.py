@@ -1,4 +1,4 @@
-"""The Triton kernels of a step: its mask, the new state, and the gradients.
+"""The Triton kernels of a step: its mask, and the new state.
 
 Triton works on blocks whose sides are powers of two. Channels, priors and hidden units are padded
 to them: what is beyond is loaded as zero and never stored. The inputs of the hidden layer are six
@@ -26,8 +26,11 @@ FORMS = tuple(map(tuple, stencil(sobel_divisor=1, laplacian_divisor=1).astype(in
 """The filters `[5, 27]` before their scales, whole numbers."""
 BLOCK = 1024
 
+# Triton 3.4, which comes with torch 2.8, keeps it in its language.
+constexpr_function = getattr(triton, "constexpr_function", None) or vars(tl)["constexpr_function"]
 
-@triton.constexpr_function
+
+@constexpr_function
 def filter_weight(number, offset):
     """Weight of a filter at an offset; a number that is known when a kernel is compiled."""
     return FORMS[number][offset]
@@ -38,15 +41,16 @@ def perceive(state, neighbours, cells, rows, inside, scales, C: tl.constexpr, WI
     """State, gradient along x, y and z, and Laplacian of a tile of cells, each `[TILE, WIDTH]`.
 
     The filters are whole numbers, known when the kernel is compiled; the result is multiplied by
-    `scales`.
+    `scales`. Offsets are added up in 32 bits, here and below, before there is a pointer: pointers
+    to 27 lines of the table would fill registers all through the kernel.
     """
     channels = tl.arange(0, WIDTH)[None, :]
     wanted = inside[:, None] & (channels < C)
     own = tl.zeros([rows.shape[0], WIDTH], tl.float32)
     x, y, z, laplacian = own, own, own, own
     for offset in tl.static_range(27):
-        around = tl.load(neighbours + offset * cells + rows, mask=inside, other=0)
-        s = tl.load(state + around[:, None] * C + channels, mask=wanted, other=0).to(tl.float32)
+        around = tl.load(neighbours + (rows + offset * cells), mask=inside, other=0)
+        s = tl.load(state + (around[:, None] * C + channels), mask=wanted, other=0).to(tl.float32)
         if filter_weight(0, offset) != 0:
             own = s
         if filter_weight(1, offset) != 0:
@@ -57,6 +61,15 @@ def perceive(state, neighbours, cells, rows, inside, scales, C: tl.constexpr, WI
             z += filter_weight(3, offset) * s
         laplacian += filter_weight(4, offset) * s
     return own * scales[0], x * scales[1], y * scales[2], z * scales[3], laplacian * scales[4]
+
+
+@triton.jit
+def prior_block(priors, rows, inside, P: tl.constexpr, PRIOR_WIDTH: tl.constexpr):
+    """The priors of a tile of cells `[TILE, PRIOR_WIDTH]`, and behind them a column of ones."""
+    columns = tl.arange(0, PRIOR_WIDTH)[None, :]
+    wanted = inside[:, None] & (columns < P)
+    p = tl.load(priors + (rows[:, None] * P + columns), mask=wanted, other=0).to(tl.float32)
+    return tl.where(inside[:, None] & (columns == P), 1.0, p)
 
 
 @triton.jit
@@ -75,13 +88,11 @@ def hidden_inputs(
 ):
     """What the hidden layer of a tile of cells sees, in six blocks of the state's type.
 
-    After the priors comes a column of ones: W1 is zero there, and its gradient is that of b1.
+    After the priors comes a column of ones: W1 is taken as zero there, and its gradient is that of
+    b1.
     """
     own, x, y, z, laplacian = perceive(state, neighbours, cells, rows, inside, scales, C, WIDTH)
-    columns = tl.arange(0, PRIOR_WIDTH)[None, :]
-    wanted = inside[:, None] & (columns < P)
-    p = tl.load(priors + rows[:, None] * P + columns, mask=wanted, other=0).to(tl.float32)
-    p = tl.where(inside[:, None] & (columns == P), 1.0, p)
+    p = prior_block(priors, rows, inside, P, PRIOR_WIDTH)
     kind: tl.constexpr = state.dtype.element_ty
     return own.to(kind), x.to(kind), y.to(kind), z.to(kind), laplacian.to(kind), p.to(kind)
 
@@ -90,30 +101,28 @@ def hidden_inputs(
 def _columns(hidden, units, first, count, H, INPUTS: tl.constexpr, WIDTH: tl.constexpr):
     inputs = tl.arange(0, WIDTH)[:, None]
     wanted = (inputs < count) & (units < H)[None, :]
-    return tl.load(hidden + units[None, :] * INPUTS + first + inputs, mask=wanted, other=0)
+    return tl.load(hidden + (units[None, :] * INPUTS + first + inputs), mask=wanted, other=0)
 
 
 @triton.jit
-def hidden_weights(
+def hidden_block(
     hidden,
     units,
-    number: tl.constexpr,
+    number,
+    block: tl.constexpr,
     C: tl.constexpr,
     P: tl.constexpr,
     H: tl.constexpr,
     WIDTH: tl.constexpr,
     PRIOR_WIDTH: tl.constexpr,
 ):
-    """W1ᵀ of some hidden units, in six blocks `[WIDTH, UNITS]`."""
+    """W1ᵀ of some hidden units, for one of the six blocks of their inputs: `[WIDTH, UNITS]`."""
     inputs: tl.constexpr = 5 * C + P
-    return (
-        _columns(hidden, units, 0, C, H, inputs, WIDTH).to(number),
-        _columns(hidden, units, C, C, H, inputs, WIDTH).to(number),
-        _columns(hidden, units, 2 * C, C, H, inputs, WIDTH).to(number),
-        _columns(hidden, units, 3 * C, C, H, inputs, WIDTH).to(number),
-        _columns(hidden, units, 4 * C, C, H, inputs, WIDTH).to(number),
-        _columns(hidden, units, 5 * C, P, H, inputs, PRIOR_WIDTH).to(number),
-    )
+    if block < 5:
+        part = _columns(hidden, units, block * C, C, H, inputs, WIDTH)
+    else:
+        part = _columns(hidden, units, 5 * C, P, H, inputs, PRIOR_WIDTH)
+    return part.to(number)
 
 
 @triton.jit
@@ -121,15 +130,35 @@ def output_weights(output, units, number, C: tl.constexpr, H: tl.constexpr, WIDT
     """W2ᵀ `[UNITS, WIDTH]` of some hidden units."""
     channels = tl.arange(0, WIDTH)[None, :]
     wanted = (units < H)[:, None] & (channels < C)
-    return tl.load(output + channels * H + units[:, None], mask=wanted, other=0).to(number)
+    return tl.load(output + (channels * H + units[:, None]), mask=wanted, other=0).to(number)
 
 
 @triton.jit
-def hidden_layer(z, first, bias, TILE: tl.constexpr, PRECISION: tl.constexpr):
-    """W1 [z ‖ priors] + b1 `[TILE, UNITS]`, before what is negative becomes zero."""
-    h = tl.zeros([TILE, bias.shape[0]], tl.float32) + bias[None, :]
+def hidden_layer(
+    z,
+    hidden,
+    bias,
+    units,
+    number,
+    C: tl.constexpr,
+    P: tl.constexpr,
+    H: tl.constexpr,
+    WIDTH: tl.constexpr,
+    PRIOR_WIDTH: tl.constexpr,
+    TILE: tl.constexpr,
+    PRECISION: tl.constexpr,
+):
+    """W1 [z ‖ priors] + b1 `[TILE, UNITS]`, before what is negative becomes zero.
+
+    Weights come from cache when they are multiplied. Barriers keep the compiler from fetching
+    those of later products beforehand, for which there are not enough registers.
+    """
+    b = tl.load(bias + units, mask=units < H, other=0).to(tl.float32)
+    h = tl.zeros([TILE, units.shape[0]], tl.float32) + b[None, :]
     for block in tl.static_range(6):
-        h = tl.dot(z[block], first[block], h, input_precision=PRECISION)
+        first = hidden_block(hidden, units, number, block, C, P, H, WIDTH, PRIOR_WIDTH)
+        h = tl.dot(z[block], first, h, input_precision=PRECISION)
+        tl.debug_barrier()
     return h
 
 
@@ -169,199 +198,33 @@ def forward_kernel(
 ):
     """The new state: state + W2 relu(W1 [z ‖ priors] + b1) on `rows`, state elsewhere.
 
-    Programs take tiles of `rows` in turns and keep the weights of UNITS hidden units meanwhile;
-    if there are more units, their part is added afterwards.
+    Programs take tiles of `rows` in turns. What a tile perceives is kept while the hidden units are
+    gone through, UNITS at a time: their weights come from cache, which holds them all.
     """
     number: tl.constexpr = state.dtype.element_ty
     channels = tl.arange(0, WIDTH)[None, :]
-    for portion in range(0, H, UNITS):
-        units = portion + tl.arange(0, UNITS)
-        first = hidden_weights(hidden, units, number, C, P, H, WIDTH, PRIOR_WIDTH)
-        b = tl.load(bias + units, mask=units < H, other=0).to(tl.float32)
-        second = output_weights(output, units, number, C, H, WIDTH)
-
-        for tile in range(tl.program_id(0), tl.cdiv(changing, TILE), tl.num_programs(0)):
-            if portion == 0:
-                _copy_cells(state, out, rows, tile, changing, cells, C, TILE)
-            tl.debug_barrier()  # other threads of this program have written what is read below
-            at = tile * TILE + tl.arange(0, TILE)
-            inside = at < changing
-            cell = tl.load(rows + at, mask=inside, other=0)
-            z = hidden_inputs(
-                state, neighbours, priors, cells, cell, inside, scales, C, P, WIDTH, PRIOR_WIDTH
+    for tile in range(tl.program_id(0), tl.cdiv(changing, TILE), tl.num_programs(0)):
+        _copy_cells(state, out, rows, tile, changing, cells, C, TILE)
+        at = tile * TILE + tl.arange(0, TILE)
+        inside = at < changing
+        cell = tl.load(rows + at, mask=inside, other=0)
+        z = hidden_inputs(
+            state, neighbours, priors, cells, cell, inside, scales, C, P, WIDTH, PRIOR_WIDTH
+        )
+        change = tl.zeros([TILE, WIDTH], tl.float32)
+        for portion in range(0, H, UNITS):
+            units = portion + tl.arange(0, UNITS)
+            h = hidden_layer(
+                z, hidden, bias, units, number, C, P, H, WIDTH, PRIOR_WIDTH, TILE, PRECISION
             )
-            h = hidden_layer(z, first, b, TILE, PRECISION)
+            second = output_weights(output, units, number, C, H, WIDTH)
             h = tl.where(h < 0, 0.0, h).to(number)  # not a maximum: a NaN stays visible
-            change = tl.dot(h, second, input_precision=PRECISION)
-            to = out + cell[:, None] * C + channels
-            wanted = inside[:, None] & (channels < C)
-            before = tl.load(to, mask=wanted, other=0).to(tl.float32)
-            tl.store(to, (before + change).to(number), mask=wanted)
-
-
-# Numbers known when a kernel is compiled are written in capitals, as is the custom in Triton. Its
-# functions are not typed as what they are inside a kernel.
-# ruff: noqa: N803
-# pyright: reportArgumentType=false, reportGeneralTypeIssues=false, reportCallIssue=false
-
-
-@triton.jit
-def _add_products(z, to_h, sums, PRECISION: tl.constexpr):
-    """Each block of z, transposed, times the gradient of the hidden layer, added to `sums`."""
-    return (
-        tl.dot(tl.trans(z[0]), to_h, sums[0], input_precision=PRECISION),
-        tl.dot(tl.trans(z[1]), to_h, sums[1], input_precision=PRECISION),
-        tl.dot(tl.trans(z[2]), to_h, sums[2], input_precision=PRECISION),
-        tl.dot(tl.trans(z[3]), to_h, sums[3], input_precision=PRECISION),
-        tl.dot(tl.trans(z[4]), to_h, sums[4], input_precision=PRECISION),
-        tl.dot(tl.trans(z[5]), to_h, sums[5], input_precision=PRECISION),
-    )
-
-
-@triton.jit
-def _store_lines(to, first, count, units, values, H: tl.constexpr):
-    """Store `count` lines of `values` `[WIDTH, UNITS]` from line `first` of `to` `[lines, H]`."""
-    lines = tl.arange(0, values.shape[0])[:, None]
-    wanted = (lines < count) & (units < H)[None, :]
-    tl.store(to + (first + lines) * H + units[None, :], values, mask=wanted)
-
-
-# Sizes that differ from step to step or frame to frame must not compile the kernels anew.
-@triton.jit(do_not_specialize=["cells", "changing"])
-def weights_kernel(
-    state,
-    rows,
-    neighbours,
-    priors,
-    hidden,
-    bias,
-    output,
-    gradient,
-    to_perceived,
-    place,
-    partials,
-    cells,
-    changing,
-    scales,
-    C: tl.constexpr,
-    P: tl.constexpr,
-    H: tl.constexpr,
-    WIDTH: tl.constexpr,
-    PRIOR_WIDTH: tl.constexpr,
-    UNITS: tl.constexpr,
-    TILE: tl.constexpr,
-    PRECISION: tl.constexpr,
-):
-    """Gradients of the weights, and of what the changing cells perceived.
-
-    Writes a program's sums to `partials` `[programs, 5C + P + 1 + C, H]` (W1ᵀ, b1, W2), the
-    gradient of z before its scales to `to_perceived` `[m, 5C]`, and to `place` `[n]` where in
-    `rows` a changing cell is.
-    """
-    number: tl.constexpr = state.dtype.element_ty
-    channels = tl.arange(0, WIDTH)[None, :]
-    partial = partials + tl.program_id(0) * (6 * C + P + 1) * H
-    for portion in range(0, H, UNITS):
-        units = portion + tl.arange(0, UNITS)
-        first = hidden_weights(hidden, units, number, C, P, H, WIDTH, PRIOR_WIDTH)
-        b = tl.load(bias + units, mask=units < H, other=0).to(tl.float32)
-        second = output_weights(output, units, number, C, H, WIDTH)
-        zeros = tl.zeros([WIDTH, UNITS], tl.float32)
-        sums = (zeros, zeros, zeros, zeros, zeros, tl.zeros([PRIOR_WIDTH, UNITS], tl.float32))
-        sum_second = zeros
-        tl.debug_barrier()  # other threads may have written what is added to below
-
-        for tile in range(tl.program_id(0), tl.cdiv(changing, TILE), tl.num_programs(0)):
-            at = tile * TILE + tl.arange(0, TILE)
-            inside = at < changing
-            wanted = inside[:, None] & (channels < C)
-            cell = tl.load(rows + at, mask=inside, other=0)
-            tl.store(place + cell, at, mask=inside)
-            g = tl.load(gradient + cell[:, None] * C + channels, mask=wanted, other=0)
-            z = hidden_inputs(
-                state, neighbours, priors, cells, cell, inside, scales, C, P, WIDTH, PRIOR_WIDTH
-            )
-            h = hidden_layer(z, first, b, TILE, PRECISION)
-            to_h = tl.dot(g, tl.trans(second), input_precision=PRECISION)
-            to_h = tl.where(h <= 0, 0.0, to_h).to(number)
-            h = tl.where(h < 0, 0.0, h).to(number)
-            sum_second = tl.dot(tl.trans(g), h, sum_second, input_precision=PRECISION)
-            sums = _add_products(z, to_h, sums, PRECISION)
-            for block in tl.static_range(5):
-                to_z = tl.dot(to_h, tl.trans(first[block]), input_precision=PRECISION)
-                to_z *= scales[block]
-                to = to_perceived + at[:, None] * (5 * C) + block * C + channels
-                if portion > 0:
-                    to_z += tl.load(to, mask=wanted, other=0).to(tl.float32)
-                tl.store(to, to_z.to(number), mask=wanted)
-
-        for block in tl.static_range(5):
-            _store_lines(partial, block * C, C, units, sums[block], H)
-        _store_lines(partial, 5 * C, P + 1, units, sums[5], H)
-        _store_lines(partial, 5 * C + P + 1, C, units, sum_second, H)
-
-
-@triton.jit(do_not_specialize=["cells", "pairs"])
-def state_kernel(
-    gradient,
-    to_perceived,
-    place,
-    neighbours,
-    mutual,
-    begin,
-    source,
-    weights,
-    to_state,
-    cells,
-    pairs,
-    C: tl.constexpr,
-    WIDTH: tl.constexpr,
-    TILE: tl.constexpr,
-):
-    """Gradient of the state: each cell collects from the cells that perceived it.
-
-    `to_perceived` and `place` are those of `weights_kernel`, -1 where a cell did not change; the
-    arrays from `mutual` to `weights` are those of `Perceivers`.
-    """
-    channels = tl.arange(0, WIDTH)[None, :]
-    cell = tl.program_id(0) * TILE + tl.arange(0, TILE)
-    inside = cell < cells
-    at = cell[:, None] * C + channels
-    total = tl.load(gradient + at, mask=inside[:, None] & (channels < C), other=0).to(tl.float32)
-
-    bits = tl.load(mutual + cell, mask=inside, other=0)
-    for offset in tl.static_range(27):
-        counts = ((bits >> offset) & 1) == 1
-        other = tl.load(neighbours + (26 - offset) * cells + cell, mask=counts, other=0)
-        spot = tl.load(place + other, mask=counts, other=-1)[:, None]
-        given = (spot >= 0) & (channels < C)
-        z = to_perceived + spot * (5 * C) + channels
-        for block in tl.static_range(5):
-            if filter_weight(block, offset) != 0:
-                values = tl.load(z + block * C, mask=given, other=0).to(tl.float32)
-                total += filter_weight(block, offset) * values
-
-    first = tl.load(begin + cell, mask=inside, other=0)
-    last = tl.load(begin + cell + 1, mask=inside, other=0)
-    for k in range(tl.max(last - first)):
-        pair = first + k
-        counts = pair < last
-        other = tl.load(source + pair, mask=counts, other=0)
-        spot = tl.load(place + other, mask=counts, other=-1)[:, None]
-        given = (spot >= 0) & (channels < C)
-        z = to_perceived + spot * (5 * C) + channels
-        for block in tl.static_range(5):
-            weight = tl.load(weights + block * pairs + pair, mask=counts, other=0)[:, None]
-            total += weight * tl.load(z + block * C, mask=given, other=0).to(tl.float32)
-
-    total = tl.where(inside[:, None], total, 0.0)  # the outside, row n, is a constant
-    tl.store(to_state + at, total, mask=(cell <= cells)[:, None] & (channels < C))
-
-
-# Numbers known when a kernel is compiled are written in capitals, as is the custom in Triton. Its
-# functions are not typed as what they are inside a kernel.
-# ruff: noqa: N803
-# pyright: reportArgumentType=false, reportGeneralTypeIssues=false, reportCallIssue=false
+            change = tl.dot(h, second, change, input_precision=PRECISION)
+        at = cell[:, None] * C + channels
+        wanted = inside[:, None] & (channels < C)
+        before = tl.load(state + at, mask=wanted, other=0).to(tl.float32)
+        tl.debug_barrier()  # other threads of this program have copied what is written below
+        tl.store(out + at, (before + change).to(number), mask=wanted)
 
 
 @triton.jit(do_not_specialize=["cells", "key", "threshold"])
@@ -394,5 +257,7 @@ def changing_rows(hashes: Tensor, *, seed: int, step: int, probability: float) -
     changes = torch.empty(n, dtype=torch.bool, device=hashes.device)
     key, threshold = int(mask_key(seed, step)), int(mask_threshold(probability))
     with torch.cuda.device_of(hashes):
-        _mask_kernel[(triton.cdiv(n, BLOCK),)](hashes, changes, n, key, threshold, BLOCK)
+        _mask_kernel[(triton.cdiv(n, BLOCK),)](
+            hashes, changes, n, key, threshold, BLOCK, num_stages=1, enable_fp_fusion=True
+        )
     return changes.nonzero().squeeze(1).int()

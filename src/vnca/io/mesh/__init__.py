@@ -26,7 +26,7 @@ from vnca.core.errors import (
     VncaError,
 )
 from vnca.core.files import existing_file
-from vnca.io.mesh.entries import numbers
+from vnca.core.records import numbers
 from vnca.io.mesh.glb import DAMAGE, Glb
 from vnca.io.mesh.obj_ply import PlyMesh, parse_ply, plain_obj
 from vnca.io.picture import FORMATS

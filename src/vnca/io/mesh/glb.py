@@ -19,7 +19,7 @@ import numpy as np
 from vnca.core import AnyArray
 from vnca.core.errors import FileFormatError
 from vnca.core.files import existing_file, whole_file
-from vnca.io.mesh.entries import whole
+from vnca.core.records import whole
 
 _MAGIC, _VERSION = 0x46546C67, 2
 _JSON, _BIN = 0x4E4F534A, 0x004E4942

@@ -13,8 +13,8 @@ from vnca.core import AnyArray, FloatArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import FileFormatError
 from vnca.core.files import whole_file
+from vnca.core.records import number, numbers, whole
 from vnca.io.mesh import TO_OURS, TRIANGLES, Mesh, Surface, trimesh_for
-from vnca.io.mesh.entries import number, numbers, whole
 from vnca.io.mesh.glb import DAMAGE, Glb
 from vnca.io.picture import FORMATS, kind_of
 

@@ -19,7 +19,7 @@ from torch.nn import functional
 from vnca.core import BoolArray, FloatArray
 from vnca.core.camera import Orthographic, view_axes
 from vnca.io.mesh import Mesh
-from vnca.meshes.raster import visible
+from vnca.meshes import visible
 from vnca.painting.block import block_domain
 from vnca.rendering.colour import linear_to_srgb
 from vnca.rendering.march import sample
