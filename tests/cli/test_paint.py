@@ -178,3 +178,43 @@ def test_one_line_of_python(smoke: Path, style: Path, tmp_path: Path) -> None:
     assert asked["preset"]["iterations"] == 2
     with pytest.raises(library.VncaError, match=r"`velocity_unit`: no such .* `velocity_units`"):
         library.paint(smoke, style, tmp_path / "more", velocity_unit="m/s")
+
+
+@pytest.fixture
+def painted_with(vnca: Vnca, smoke: Path, tmp_path: Path) -> Callable[..., Any]:
+    """Paints one frame in the style of the library, without a film: density and colour."""
+
+    def paint(name: str, *options: object) -> Any:
+        out = tmp_path / name
+        done = vnca("paint", smoke, "--style", "ink", "-o", out, "-f", "1", "-r", "1", *options)
+        assert done.code == 0, done.err
+        (path,) = (out / "painted").iterdir()
+        with open_vdb(path) as file:
+            grids = {grid: file.read(grid) for grid in ("density", "Cd")}
+        box = grids["density"].active_box()
+        return tuple(grids[grid].to_dense(box)[0] for grid in ("density", "Cd"))
+
+    return paint
+
+
+def test_strengths_say_how_much_of_the_painting_is_seen(
+    painted_with: Callable[..., Any], smoke: Path, tmp_path: Path
+) -> None:
+    full = painted_with("full", "--without-film")
+    faint = painted_with("faint", "--without-film", "--strength", 0, "--density-strength", 0)
+    source = min(smoke.glob("*.vdb"))
+    with open_vdb(source) as file:
+        grid = file.read("density")
+        before = grid.to_dense(grid.active_box())[0]
+    assert abs(full[0] - before).max() > 0.01
+    assert faint[0] == pytest.approx(before, abs=1e-6)
+    assert full[1][before > 0].std() > 0.02
+    assert faint[1][before > 0] == pytest.approx(1, abs=1e-6)
+    assert not (tmp_path / "full" / "film.mp4").exists()
+
+
+def test_a_film_is_shaped_or_left_out(vnca: Vnca, smoke: Path, tmp_path: Path) -> None:
+    given = (smoke, "--style", "ink", "-o", tmp_path / "out", "--without-film")
+    assert "--rows, --without-film: one of them" in vnca("paint", *given, "--rows", 32).complaint
+    assert "--strength 2.0: must be" in vnca("paint", *given, "--strength", 2).complaint
+    assert not (tmp_path / "out").exists()

@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation
 
 from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import GridError, OptionError, OutputError, ShapeError
@@ -79,8 +80,8 @@ def test_a_painted_file_has_new_density_and_colour_and_all_the_rest(
         for grid in (new, cd):
             assert grid.is_half
             assert grid.transform == old.transform
-            np.testing.assert_array_equal(grid.tree.leaf_active, old.tree.leaf_active)
-            np.testing.assert_array_equal(grid.tree.leaf_origins, old.tree.leaf_origins)
+        np.testing.assert_array_equal(new.tree.leaf_active, old.tree.leaf_active)
+        np.testing.assert_array_equal(new.tree.leaf_origins, old.tree.leaf_origins)
         assert new.metadata.value("note") == "of density"
         assert "note" not in cd.metadata
         values, active = cd.to_dense(Box(ORIGIN, (5, 8, 13)))
@@ -89,6 +90,28 @@ def test_a_painted_file_has_new_density_and_colour_and_all_the_rest(
         x, y, z = (start + step for start, step in zip(ORIGIN, cell, strict=True))
         ours = (z, x, y) if up == "y" else (x, y, z)
         np.testing.assert_allclose(values[cell], np.array(ours) / 64, rtol=1e-3)
+
+
+@pytest.mark.parametrize("refine", [1, 2])
+def test_colours_go_on_for_a_cell_around_the_smoke(
+    source: Path, tmp_path: Path, refine: int
+) -> None:
+    volume = read_smoke(source, PLAIN).refined(refine)
+    target = tmp_path / "painted.vdb"
+    density = volume.density
+    colour = np.where((density > 0)[..., None], np.float32(0.25), np.float32(9))
+    write_painted(
+        target, source, PLAIN, density=density, colour=np.ascontiguousarray(colour.repeat(3, 3)),
+        box=volume.box, refine=refine,
+    )  # fmt: skip
+    with open_vdb(target) as file:
+        smoke, paint = file.read("density"), file.read("Cd")
+        box = smoke.active_box().grown(2)
+        active, (values, coloured) = smoke.to_dense(box)[1], paint.to_dense(box)
+    np.testing.assert_array_equal(coloured, binary_dilation(active, np.ones((3, 3, 3))))
+    if refine > 1:  # else cells without density are active in the source
+        assert values[coloured] == pytest.approx(0.25, abs=1e-3)
+    assert not values[~coloured].any()
 
 
 @pytest.mark.parametrize("up", ["z", "y"])
@@ -108,7 +131,7 @@ def test_finer_paint_lies_where_the_smoke_does_and_all_the_rest_stays(
     assert seen is not None
     shown = density > 0
     np.testing.assert_allclose(seen[shown], colour[shown], rtol=1e-3)
-    assert not seen[~shown].any()
+    assert not seen[~binary_dilation(shown, np.ones((3, 3, 3)))].any()
     with open_vdb(source) as before, open_vdb(target) as after:
         assert after.read("density").is_half
         for name in ("heat", "velocity"):
@@ -134,13 +157,10 @@ def test_colour_can_have_other_names_and_a_larger_box(source: Path, tmp_path: Pa
     )
     with open_vdb(target) as file:
         assert file.names == ("heat", "density", "Cd", "velocity", "color", "paint")
+        active = file.read("density").to_dense(volume.box)[1]
         for name in ("color", "paint"):
-            values, active = file.read(name).to_dense(box)
-            np.testing.assert_allclose(
-                values[2:-2, 2:-2, 2:-2][active[2:-2, 2:-2, 2:-2]],
-                colour[active[2:-2, 2:-2, 2:-2]],
-                rtol=1e-3,
-            )
+            values = file.read(name).to_dense(box)[0]
+            np.testing.assert_allclose(values[2:-2, 2:-2, 2:-2][active], colour[active], rtol=1e-3)
             assert values.max() < 9
 
 
@@ -199,11 +219,11 @@ def test_a_colour_has_of_the_densitys_metadata_what_is_true_of_it(
     write_vdb(tmp_path / "source.vdb", [grid])
     with open_vdb(paint(tmp_path / "source.vdb", refine=refine)) as file:
         density, colour = file.grids["density"].metadata, file.grids["Cd"].metadata
-    upper = (3 * refine - 1, 4 * refine - 1, 5 * refine - 1)
-    for of_grid in (density, colour):
-        assert of_grid.value("file_bbox_min") == (0, 0, 0)
-        assert of_grid.value("file_bbox_max") == upper
-        assert of_grid.value("file_voxel_count") == 60 * refine**3
+    sides = np.array([3, 4, 5]) * refine
+    for of_grid, rim in ((density, 0), (colour, 1)):
+        assert of_grid.value("file_bbox_min") == (-rim, -rim, -rim)
+        assert of_grid.value("file_bbox_max") == tuple(sides - 1 + rim)
+        assert of_grid.value("file_voxel_count") == np.prod(sides + 2 * rim)
         assert of_grid.value("class") == "fog volume"
         assert of_grid.value("is_local_space") is False
     statistics = {name for name in colour if name.startswith("file_")}
@@ -364,7 +384,11 @@ def test_mantaflow_frames_become_vdb_files_with_their_velocity(tmp_path: Path) -
     np.testing.assert_array_equal(painted.velocity, volume.velocity)
     with open_vdb(target) as file:
         assert file.names == ("density", "Cd", "velocity")
-        assert file.read("Cd").active_voxels == 63
+        smoke = file.read("density")
+        assert smoke.active_voxels == 63
+        active = smoke.to_dense(smoke.active_box().grown(1))[1]
+        with_rim = binary_dilation(active, np.ones((3, 3, 3))).sum()
+        assert file.read("Cd").active_voxels == with_rim
         assert file.grids["velocity"].grid_class == "staggered"
     fine = volume.refined(3)
     write_painted(

@@ -4,10 +4,9 @@ from math import pi
 
 import torch
 from jaxtyping import Float
+from textures import chance, log_uniform, smooth, uniform
 from torch import Generator, Tensor
 from torch.nn import functional
-
-from textures import chance, log_uniform, smooth, uniform
 
 STEEPEST = 0.35
 """Largest change of displacement from a pixel to the next; below 1 nothing folds over."""

@@ -5,17 +5,16 @@ from dataclasses import dataclass
 from math import pi
 
 import torch
-from jaxtyping import Float
-from torch import Generator, Tensor
-from torch.nn import functional
-
 from displacement import (
     random_displacement,
     random_speeds,
     sampled,
     sources,
 )
+from jaxtyping import Float
 from textures import chance, log_uniform, smooth, uniform
+from torch import Generator, Tensor
+from torch.nn import functional
 
 MOST_REPLACED = 0.4
 """Share of a texture's variance that another takes over at most between the pictures."""

@@ -10,10 +10,10 @@ from typing import Literal
 import torch
 import tyro
 from jaxtyping import Float
-from torch import Generator, Tensor
-
 from pairs import Pairs, random_pairs
 from textures import KINDS, bank
+from torch import Generator, Tensor
+
 from vnca.core.errors import BackendUnavailableError, VncaError
 from vnca.core.files import writable_file
 from vnca.features.flow import FlowNetwork

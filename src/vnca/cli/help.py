@@ -31,8 +31,8 @@ _SMOKE = ("velocity-units", "fps", "up-axis")
 _FILM = ("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background", "light")
 COMMON: Mapping[str, tuple[str, ...]] = {
     "paint": (
-        *("out", "style", "preset", "training-frame", "frames", "refine", "seed", *_SMOKE),
-        *("device", "resume", "overwrite"),
+        *("out", "style", "preset", "training-frame", "frames", "refine", "strength", "seed"),
+        *(*_SMOKE, "device", "resume", "overwrite"),
     ),
     "train": (
         *("out", "preset", "iterations", "view.size", "seed", "texture", "graft", *_SMOKE),

@@ -9,7 +9,7 @@ import numpy as np
 
 from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import GridError, OptionError, OutputError, ShapeError
-from vnca.core.field import Field, divided
+from vnca.core.field import Field, dilated, divided
 from vnca.core.lattice import Lattice, Placement
 from vnca.core.volume import Volume, refined_transform
 from vnca.io.provenance import Provenance, without_provenance
@@ -36,6 +36,7 @@ from vnca.io.vdb import (
 )
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
+from vnca.io.velocity import extrapolated
 
 COLOUR_GRIDS = ("Cd",)
 # Metadata of a density that hold for a colour on its cells as well. All others may tell of its
@@ -250,6 +251,18 @@ class _Painting:
         return Field(before.bricks, factor, self.density.box, outside=1.0)
 
 
+def _with_rim(colour: Field, active: Field) -> tuple[Field, Field]:
+    """Colours that go on for a cell around the smoke, and the cells that have one.
+
+    Renderers interpolate density and colour one by one: beside black, the border of opaque smoke
+    would be dark.
+    """
+    box = active.box.grown(1)
+    coloured = dilated(replace(active, box=box), 1)
+    # A cell at a corner is three steps away.
+    return extrapolated(replace(colour, box=box), replace(active, box=box), 3)[0], coloured
+
+
 def _paint_vdb(
     path: Path,
     file: VdbFile,
@@ -268,6 +281,7 @@ def _paint_vdb(
     density, colour = frame.in_file(old.transform, before, what)
     background = old.tree.background
     active = frame.active(density, active, background)
+    colour, coloured = _with_rim(colour, active)
     transform = frame.transform(old.transform)
     dtype = VALUE_TYPES[old.value_type].dtype
     if dtype.kind != "f":
@@ -291,7 +305,7 @@ def _paint_vdb(
     shared = {name: old.metadata[name] for name in _SHARED_METADATA if name in old.metadata}
     grids += [
         Grid.from_fields(
-            name, colour, active, transform=transform, metadata=shared, half=old.is_half
+            name, colour, coloured, transform=transform, metadata=shared, half=old.is_half
         )
         for name in colour_grids
     ]
@@ -311,17 +325,18 @@ def _paint_other(
     before = stored.density
     density, colour = frame.in_file(transform, before, str(source))
     active = frame.active(density, replace(before, values=before.values != 0, outside=False))
+    colour, coloured = _with_rim(colour, active)
     grids = [
         Grid.from_fields(
             name,
             values,
-            active,
+            stored,
             transform=frame.transform(transform),
             grid_class="fog volume",
         )
-        for name, values in [
-            (format.density_grid, density),
-            *((name, colour) for name in colour_grids),
+        for name, values, stored in [
+            (format.density_grid, density, active),
+            *((name, colour, coloured) for name in colour_grids),
         ]
     ]
     if (velocity := stored.velocity) is not None:

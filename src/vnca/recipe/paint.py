@@ -13,7 +13,7 @@ import numpy as np
 import vnca
 from vnca.core.errors import FileFormatError, OptionError, OutputError
 from vnca.core.files import existing_file, whole_file, writable_folder
-from vnca.core.records import changed, distributed
+from vnca.core.records import changed, changed_fields, distributed
 from vnca.io import SmokeFormat, read_smoke
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import NO_VELOCITY
@@ -34,7 +34,7 @@ MODEL_SUFFIX = ".safetensors"
 LOOKED_AT = 12
 """Frames, at most, of which the one with the most smoke is trained on."""
 _OF_TRAINING = ("preset", "training_frame", "memory_budget")
-_ANY_TIME = ("out", "resume", "overwrite", "device", "memory_budget")
+_ANY_TIME = ("out", "resume", "overwrite", "device", "memory_budget", "without_film")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +60,10 @@ class PaintRun:
     """Paint on a grid so many times as fine as that of the smoke, at most 8."""
     seed: int = 0
     """Same seed, same machine, same painting."""
+    strength: float = StylizeConfig.strength
+    """Colour of the painting, from 0 (white smoke) to 1."""
+    density_strength: float = StylizeConfig.density_strength
+    """How much the painting changes the density, from 0 (not at all) to 1."""
     device: str = "auto"
     """Where: auto, cpu, cuda, or as cuda:1."""
     memory_budget: str = "auto"
@@ -68,12 +72,17 @@ class PaintRun:
     """Go on where an earlier call was interrupted, with the same options."""
     overwrite: bool = False
     """Replace what an earlier call left in the folder."""
+    without_film: bool = False
+    """Paint only, without a film of it."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     film: FilmConfig = field(default_factory=FilmConfig)
     """How the painting is filmed."""
 
     def __post_init__(self) -> None:
+        StylizeConfig(strength=self.strength, density_strength=self.density_strength)
+        if self.without_film and (shaped := changed_fields(self.film, FilmConfig())):
+            raise OptionError(f"`film.{shaped[0]}`, `without_film`: one of them, not both")
         if (self.picture is None) == (self.style is None):
             raise OptionError("`picture`, `style`: expected one of them")
         if self.style is not None:
@@ -107,10 +116,13 @@ def paint(
     frames: str | None = None,
     refine: int = 2,
     seed: int = 0,
+    strength: float = StylizeConfig.strength,
+    density_strength: float = StylizeConfig.density_strength,
     device: str = "auto",
     memory_budget: str = "auto",
     resume: bool = False,
     overwrite: bool = False,
+    without_film: bool = False,
     film: FilmConfig | Mapping[str, Any] | None = None,
     watch: Watch = SILENT,
     **options: Any,
@@ -127,10 +139,13 @@ def paint(
         frames: Which frames to paint, such as `30-53`; all unless given.
         refine: Paint on a grid so many times as fine as the smoke's.
         seed: Same seed, same machine, same painting.
+        strength: Colour of the painting, from 0 (white smoke) to 1.
+        density_strength: How much it changes the density, from 0 (not at all) to 1.
         device: Where to compute: `auto`, `cpu`, `cuda`, or such as `cuda:1`.
         memory_budget: Memory for the training, such as `12GB`.
         resume: Go on where an earlier call was interrupted, or else begin.
         overwrite: Replace what an earlier call left in the folder.
+        without_film: Paint only.
         film: How it is filmed: a `FilmConfig`, or some of its fields.
         watch: Is told how far it has come, and may cancel.
         **options: Fields of `SmokeFormat` (`velocity_units="mantaflow"`); in the place of those
@@ -156,10 +171,13 @@ def paint(
         frames=frames,
         refine=refine,
         seed=seed,
+        strength=strength,
+        density_strength=density_strength,
         device=device,
         memory_budget=memory_budget,
         resume=resume,
         overwrite=overwrite,
+        without_film=without_film,
         film=changed("film", FilmConfig(), film),
     )
     (smoke,) = distributed(options, recorded_format(asked))
@@ -202,7 +220,7 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
         sequence=options.sequence,
         out=options.out / PAINTED,
         frames=options.frames,
-        preview=options.out / FILM,
+        preview=None if options.without_film else options.out / FILM,
         refine=options.refine,
         resume=goes_on,
         overwrite=options.overwrite,
@@ -210,7 +228,9 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
         density_scale=scales.density,
         device=options.device,
         smoke=smoke,
-        config=StylizeConfig(seed=options.seed),
+        config=StylizeConfig(
+            strength=options.strength, density_strength=options.density_strength, seed=options.seed
+        ),
         film=options.film,
     )
     with closing(painting.run(asked, watch, style)) as paths:  # type: ignore[type-var]

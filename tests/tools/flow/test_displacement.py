@@ -1,6 +1,4 @@
 import torch
-from torch import Generator
-
 from displacement import (
     STEEPEST,
     random_displacement,
@@ -8,6 +6,7 @@ from displacement import (
     sampled,
     sources,
 )
+from torch import Generator
 
 
 def fields(speed: float, uneven: float = 1.0) -> torch.Tensor:

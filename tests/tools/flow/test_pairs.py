@@ -1,10 +1,9 @@
 import pytest
 import torch
-from torch import Generator, Tensor
-
 from displacement import random_displacement, sampled
 from pairs import moving_texture, random_pairs, random_silhouette
 from textures import bank, spectral, waves
+from torch import Generator, Tensor
 
 
 @pytest.fixture(scope="module")

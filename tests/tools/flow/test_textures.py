@@ -1,8 +1,7 @@
 import pytest
 import torch
-from torch import Generator
-
 from textures import KINDS, PHOTOGRAPHS, bank, cut, photographs, spectral
+from torch import Generator
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)

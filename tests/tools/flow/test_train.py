@@ -2,12 +2,12 @@ from pathlib import Path
 
 import pytest
 import torch
-from torch import Generator, Tensor
-
 import train as loop
 from pairs import Pairs, random_pairs
 from textures import bank, spectral
+from torch import Generator, Tensor
 from train import FlowTraining, flow_loss, train
+
 from vnca.core.errors import BackendUnavailableError, OutputError
 from vnca.features.flow import FlowNetwork
 

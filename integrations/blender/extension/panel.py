@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel, in the sidebar of the 3D view and in the data of volumes."""
+
+import bpy
+
+from . import mixing, operators, thumbnails
+from .job import clock
+from .settings import domain_of, is_smoke
+
+
+class _Panel:
+    bl_label = "Smoke Painting"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show what is chosen, and how far the work has come."""
+        layout, settings = self.layout, context.scene.vnca
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        job = operators.current
+        is_at_work = job is not None and job.is_running
+        choices = layout.column()
+        choices.enabled = not is_at_work
+        _draw_smoke(choices, context, settings)
+        _draw_style(choices, settings)
+        _draw_painting(choices, settings)
+        _draw_buttons(layout, context, settings, is_at_work=is_at_work)
+        if job is not None:
+            _draw_job(layout, job)
+
+
+class VNCA_PT_view(_Panel, bpy.types.Panel):
+    """In the sidebar of the 3D view."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "vnca"
+
+
+class VNCA_PT_volume(_Panel, bpy.types.Panel):
+    """In the data of volumes."""
+
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Only volumes."""
+        return context.object is not None and context.object.type == "VOLUME"
+
+
+class VNCA_PT_domain(_Panel, bpy.types.Panel):
+    """In the physics of domains."""
+
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "physics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Only domains of gas."""
+        return context.object is not None and domain_of(context.object) is not None
+
+
+def _draw_smoke(
+    layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup
+) -> None:
+    row = layout.row(align=True)
+    row.prop(settings, "source")
+    row.operator("vnca.use_active", text="", icon="EYEDROPPER")
+    source = settings.source
+    if source is None or not is_smoke(None, source):
+        return
+    domain = domain_of(source)
+    render = context.scene.render
+    fps = f"{render.fps / render.fps_base:g} fps"
+    if domain is not None:
+        layout.label(text=f"{fps}, time scale {domain.time_scale:g}", icon="TIME")
+        return
+    layout.prop(settings, "units")
+    if settings.units != "cells/frame":
+        layout.prop(settings, "time_scale")
+    layout.label(text=fps, icon="TIME")
+
+
+def _draw_style(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    layout.separator()
+    layout.row().prop(settings, "way", expand=True)
+    if settings.way == "LIBRARY":
+        layout.template_icon_view(settings, "style", show_labels=True, scale_popup=6.0)
+        layout.prop(settings, "style", text="")
+    elif settings.way == "MODEL":
+        layout.prop(settings, "model")
+    else:
+        layout.prop(settings, "picture")
+        layout.prop(settings, "preset")
+        layout.operator("vnca.train", icon="OUTLINER_OB_LIGHTPROBE")
+
+
+def _draw_painting(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    layout.separator()
+    for name in ("strength", "glow", "density_strength", "refine", "seed"):
+        layout.prop(settings, name)
+    layout.prop(settings, "mask")
+    if settings.mask in ("BOX", "BALL"):
+        layout.prop(settings, "mask_object")
+    elif settings.mask == "GRID":
+        layout.prop(settings, "mask_grid")
+    layout.prop(settings, "span")
+    if settings.span == "SOME":
+        row = layout.row(align=True)
+        row.prop(settings, "first")
+        row.prop(settings, "last", text="")
+    layout.prop(settings, "folder")
+    layout.prop(settings, "hide_source")
+
+
+def _draw_buttons(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    settings: bpy.types.PropertyGroup,
+    *,
+    is_at_work: bool,
+) -> None:
+    layout.separator()
+    if is_at_work:
+        layout.operator("vnca.cancel", icon="X")
+        return
+    layout.operator("vnca.preview", icon="HIDE_OFF")
+    row = layout.row(align=True)
+    row.scale_y = 1.5
+    row.operator("vnca.paint", icon="BRUSH_DATA")
+    if operators.can_go_on(context.scene):
+        row.operator("vnca.paint", text="Go On", icon="PLAY").goes_on = True
+    if settings.result is not None and mixing.is_possible():
+        layout.operator("vnca.mix", icon="GEOMETRY_NODES")
+
+
+def _draw_job(layout: bpy.types.UILayout, job: operators.Job) -> None:
+    box = layout.box()
+    if job.is_running:
+        text = f"{job.what.capitalize()} {job.done}/{job.total}" if job.total else job.what
+        if job.seconds_left is not None:
+            text += f", {clock(job.seconds_left)} left"
+        if hasattr(box, "progress"):
+            box.progress(factor=job.fraction, text=text)
+        else:
+            box.label(text=f"{text} ({job.fraction:.0%})", icon="TIME")
+        box.label(text="Esc cancels")
+    elif job.state == "failed":
+        row = box.row()
+        row.alert = True
+        row.label(text=job.message, icon="ERROR")
+        box.operator("vnca.log", icon="TEXT")
+    elif job.state == "cancelled":
+        box.label(text="Cancelled; what was finished is kept", icon="CANCEL")
+    for note in job.notes[-2:]:
+        box.label(text=note, icon="INFO")
+    if icon := thumbnails.icon_of_work(job.picture):
+        box.template_icon(icon, scale=9.0)
+
+
+_CLASSES = (VNCA_PT_view, VNCA_PT_volume, VNCA_PT_domain)
+
+
+def register() -> None:
+    """Add the panels."""
+    for kind in _CLASSES:
+        bpy.utils.register_class(kind)
+
+
+def unregister() -> None:
+    """Take them away."""
+    for kind in reversed(_CLASSES):
+        bpy.utils.unregister_class(kind)

@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Painting: the volume that shows it, where and when the smoke was, and how it looks."""
+
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from conftest import NAME, add_domain
+
+EMITTER = np.array([1.8, -0.5, 1.2])
+
+
+def paint(scene: bpy.types.Scene, **settings: object) -> bpy.types.Object:
+    for name, value in settings.items():
+        setattr(scene.vnca, name, value)
+    assert bpy.ops.vnca.paint() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    return scene.vnca.result
+
+
+def file_at(scene: bpy.types.Scene, painted: bpy.types.Object, frame: int) -> str:
+    scene.frame_set(frame)
+    painted.data.grids.load()
+    return Path(painted.data.grids.frame_filepath).name
+
+
+def stored(painted: bpy.types.Object, number: int) -> "dict[str, np.ndarray]":
+    """Densities, colours and places in the world of the active cells of a painted file."""
+    import vnca
+
+    first = Path(bpy.path.abspath(painted.data.filepath))
+    path = next(path for path in first.parent.glob("*.vdb") if int(path.stem[-4:]) == number)
+    with vnca.open_vdb(path) as file:
+        density, colour = file.read("density"), file.read("Cd")
+        box = density.active_box()
+        cells = np.argwhere(density.to_dense(box)[1]) + box.lower
+        matrix = np.array(painted.matrix_world) @ density.transform.index_to_world
+        values, active = density.to_dense(box)
+        return {
+            "density": values[active],
+            "colour": colour.to_dense(box)[0][active],
+            "place": cells @ matrix[:3, :3].T + matrix[:3, 3],
+        }
+
+
+def middle(found: "dict[str, np.ndarray]") -> np.ndarray:
+    weight = found["density"].astype(float)
+    return (weight[:, None] * found["place"]).sum(0) / weight.sum()
+
+
+def use_cycles(scene: bpy.types.Scene, size: int, samples: int) -> None:
+    """Cycles on the processor, before nothing, and linear numbers in its files."""
+    scene.render.engine = "CYCLES"
+    scene.cycles.device, scene.cycles.samples, scene.cycles.seed = "CPU", samples, 1
+    scene.cycles.use_denoising = False
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.render.film_transparent = True
+    scene.render.image_settings.file_format = "OPEN_EXR"
+
+
+def pixels_of(path: Path) -> np.ndarray:
+    """Numbers of a picture, linear RGBA."""
+    image = bpy.data.images.load(str(path), check_existing=False)
+    image.colorspace_settings.name = "Non-Color"
+    columns, rows = image.size
+    pixels = np.array(image.pixels[:]).reshape(rows, columns, 4)[::-1]
+    bpy.data.images.remove(image)
+    return pixels
+
+
+def rendered(scene: bpy.types.Scene, painted: bpy.types.Object, size: int = 64) -> np.ndarray:
+    """Linear RGBA of Cycles, seen from the front without perspective."""
+    use_cycles(scene, size, samples=8)
+    found = stored(painted, painted.data.frame_offset + 1)["place"]
+    lower, upper = found.min(0), found.max(0)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(upper - lower)) * 1.1
+    x, y, z = (lower + upper) / 2
+    camera.location, camera.rotation_euler = (x, y - 20, z), (np.pi / 2, 0, 0)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.filepath = str(Path(bpy.app.tempdir) / "seen.exr")
+    bpy.ops.render.render(write_still=True)
+    bpy.data.objects.remove(camera)
+    pixels = pixels_of(Path(scene.render.filepath))
+    assert pixels[..., 3].max() > 0.9, "nothing is seen"
+    return pixels
+
+
+def glowing(painted: bpy.types.Object, number: int) -> np.ndarray:
+    """RGBA of a frame from the front, cell by cell: what vnca takes for the painting."""
+    import vnca
+
+    first = Path(bpy.path.abspath(painted.data.filepath))
+    path = next(path for path in first.parent.glob("*.vdb") if int(path.stem[-4:]) == number)
+    with vnca.open_vdb(path) as file:
+        grid = file.read("density")
+        box = grid.active_box()
+        sigma = file.metadata["vnca_extinction"].value * grid.transform.voxel_size[0]
+        depth = sigma * grid.to_dense(box)[0].astype(float)
+        colour = file.read("Cd").to_dense(box)[0].astype(float)
+    weight = np.exp(depth - np.cumsum(depth, 1)) * (1 - np.exp(-depth))
+    seen = (weight[..., None] * colour).sum(1)
+    return np.concatenate([seen, weight.sum(1)[..., None]], 2)
+
+
+def test_cycles_shows_the_colours_of_the_painting_where_it_glows(
+    scene: bpy.types.Scene, plume: bpy.types.Object
+) -> None:
+    painted = paint(scene, glow=1.0)
+    scene.frame_set(11)
+    seen, told = rendered(scene, painted), glowing(painted, 6)
+    seen, told = (view[view[..., 3] > 0.98][:, :3] for view in (seen, told))
+    assert len(seen) > 200
+    assert seen.mean(0) == pytest.approx(told.mean(0), abs=0.04)
+    # Between cells, which are as large as three pixels, Cycles interpolates.
+    assert (seen.std(0) > 0.7 * told.std(0)).all()
+    assert np.ptp(seen.mean(0)) > 0.1
+
+
+def test_opacity_and_glow_do_not_depend_on_the_size_of_the_object(
+    scene: bpy.types.Scene, plume: bpy.types.Object
+) -> None:
+    painted = paint(scene, glow=1.0)
+    scene.frame_set(11)
+    small = rendered(scene, painted)
+    plume.scale = (5, 5, 5)
+    bpy.context.view_layer.update()
+    large = rendered(scene, painted)
+    assert large == pytest.approx(small, abs=0.05)
+
+
+def test_sliders_change_the_picture_at_once(
+    scene: bpy.types.Scene, plume: bpy.types.Object
+) -> None:
+    painted = paint(scene, glow=1.0)
+    scene.frame_set(11)
+    full = rendered(scene, painted)
+    scene.vnca.strength = 0.0
+    white = rendered(scene, painted)
+    opaque = full[..., 3] > 0.98
+    assert white[opaque][:, :3] == pytest.approx(1, abs=0.03)
+    scene.vnca.strength = 1.0
+    # A ball that holds the left half of the smoke.
+    ball = bpy.data.objects.new("Ball", None)
+    scene.collection.objects.link(ball)
+    places = stored(painted, 6)["place"]
+    ball.location = places.mean(0) - (1.0, 0, 0)
+    scene.vnca.mask_object = ball
+    for kind in ("BALL", "BOX"):
+        scene.vnca.mask = kind
+        bpy.context.view_layer.update()
+        half = rendered(scene, painted)
+        left, right = opaque.copy(), opaque.copy()
+        left[:, 22:], right[:, :38] = False, False
+        assert half[left] == pytest.approx(full[left], abs=0.05)
+        assert half[right][:, :3] == pytest.approx(1, abs=0.03)
+    scene.vnca.mask, scene.vnca.mask_grid = "GRID", "density"
+    assert abs(rendered(scene, painted) - full).max() < 1.2
+    scene.vnca.mask = "NONE"
+    assert rendered(scene, painted) == pytest.approx(full, abs=1e-3)
+
+
+def test_painting_again_is_seen(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
+    painted = paint(scene, glow=1.0)
+    scene.frame_set(11)
+    first = rendered(scene, painted)
+    again = paint(scene, density_strength=0.0, seed=7)
+    assert again == painted
+    second = rendered(scene, painted)
+    assert abs(second - first).max() > 0.05
+    assert len(painted.data.materials) == 1
+
+
+def test_a_material_of_the_artist_stays(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
+    painted = paint(scene)
+    own = bpy.data.materials.new("Own")
+    painted.data.materials[0] = own
+    scene.vnca.strength = 0.5
+    paint(scene)
+    assert painted.active_material == own
+
+
+@pytest.mark.parametrize("kind", ["plain", "adaptive", "noise"])
+def test_caches_of_domains_lie_where_the_smoke_is(
+    kind: str, scene: bpy.types.Scene, folder: Path
+) -> None:
+    domain = add_domain(scene, kind, folder / "cache")
+    scene.vnca.folder = str(folder / "out")
+    painted = paint(scene)
+    found = stored(painted, 4)
+    assert painted.data.frame_duration == 2
+    assert middle(found)[:2] == pytest.approx(EMITTER[:2], abs=0.05)
+    assert middle(found)[2] == pytest.approx(EMITTER[2] + 0.02, abs=0.08)
+    assert file_at(scene, painted, 4).endswith("0004.vdb")
+    assert {"density", "Cd", "velocity"} <= {grid.name for grid in painted.data.grids}
+    # v · 0.1 · 25 / 24 · 0.5 cells a frame, on cells of this length.
+    voxel = 3 / (16 if kind == "noise" else 32)
+    assert painted.data.velocity_scale == pytest.approx(0.1 * 25 / 24 * 0.5 * voxel, rel=1e-3)
+    domain.location.x += 1
+    domain.rotation_euler.z = 1.0
+    bpy.context.view_layer.update()
+    inside = np.array(domain.matrix_world.inverted())
+    assert not (folder / "out" / "Domain embers" / "v001" / "staged").exists()
+    moved = np.c_[stored(painted, 4)["place"], np.ones(len(found["place"]))] @ inside.T
+    assert abs(moved[:, :3]).max() <= 1
+
+
+def test_an_adaptive_domain_is_painted_as_the_whole_one(
+    scene: bpy.types.Scene, folder: Path
+) -> None:
+    middles = []
+    for kind in ("plain", "adaptive"):
+        add_domain(scene, kind, folder / kind).name = kind
+        scene.vnca.folder = str(folder)
+        scene.vnca.result = None
+        middles.append(middle(stored(paint(scene), 4)))
+    assert middles[0] == pytest.approx(middles[1], abs=0.02)
+
+
+def test_a_saved_scene_has_relative_paths(scene: bpy.types.Scene, folder: Path) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+    add_domain(scene, "plain", folder / "cache", "//cache")
+    scene.vnca.folder = "//vnca"
+    painted = paint(scene)
+    assert painted.data.filepath.startswith("//vnca")
+    assert (
+        folder / "vnca" / "Domain embers" / "v001" / "painted" / "fluid_data_0004.vdb"
+    ).is_file()
+
+
+def test_smoke_of_a_linked_scene_is_painted(scene: bpy.types.Scene, folder: Path) -> None:
+    (folder / "far").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "far" / "far.blend"))
+    add_domain(scene, "plain", folder / "far" / "cache", "//cache")
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    here = bpy.context.scene
+    with bpy.data.libraries.load(str(folder / "far" / "far.blend"), link=True) as (there, ours):
+        ours.objects = there.objects
+    (domain,) = ours.objects
+    here.collection.objects.link(domain)
+    here.vnca.source, here.vnca.folder, here.vnca.refine = domain, str(folder / "out"), 1
+    here.vnca.style = "embers"
+    here.frame_start, here.frame_end = 1, 10
+    painted = paint(here)
+    assert painted.library is None
+    assert middle(stored(painted, 4))[:2] == pytest.approx(EMITTER[:2], abs=0.05)
+    assert not domain.hide_render
+
+
+def test_the_preview_is_a_picture_and_changes_nothing(
+    scene: bpy.types.Scene, plume: bpy.types.Object, folder: Path
+) -> None:
+    scene.frame_set(12)
+    assert bpy.ops.vnca.preview() == {"FINISHED"}
+    job = import_module(f"{NAME}.operators").current
+    image = bpy.data.images.load(job.picture)
+    assert max(image.size) == 256
+    assert np.array(image.pixels[:]).std() > 0.05
+    assert scene.vnca.result is None
+    assert not (folder / "out").exists()
+
+
+def test_up_is_up(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
+    source = import_module(f"{NAME}.source")
+    assert source.smoke_of(scene, None).up_axis == "z"
+    plume.rotation_euler.x = np.pi / 2
+    bpy.context.view_layer.update()
+    assert source.smoke_of(scene, None).up_axis == "y"
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 0, 0), reason="Blender 5 brought nodes for grids")
+def test_geometry_nodes_mix_grids(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
+    painted = paint(scene, glow=1.0)
+    scene.frame_set(11)
+    full = rendered(scene, painted)
+    assert bpy.ops.vnca.mix() == {"FINISHED"}
+    assert rendered(scene, painted) == pytest.approx(full, abs=0.05)
+    scene.vnca.strength = 0.0
+    assert painted.active_material.node_tree.nodes["Strength"].outputs[0].default_value == 1
+    white = rendered(scene, painted)
+    assert white[full[..., 3] > 0.98][:, :3] == pytest.approx(1, abs=0.03)
+
+
+def test_undo_takes_the_painting_back(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
+    bpy.ops.ed.undo_push(message="before")
+    painted = paint(scene)
+    name = painted.name
+    bpy.ops.ed.undo_push(message="painted")
+    bpy.ops.ed.undo()
+    assert name not in bpy.data.objects
+    bpy.ops.ed.redo()
+    assert name in bpy.data.objects

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What goes wrong: each a clear message, nothing lost, and Blender stays free."""
+
+import os
+import signal
+import stat
+import sys
+import time
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+from conftest import NAME, add_domain
+
+
+def said(operator: Any, **options: object) -> str:
+    """The error that an operator reports."""
+    with pytest.raises(RuntimeError) as caught:
+        operator(**options)
+    return str(caught.value).strip().removeprefix("Error: ")
+
+
+def begin(scene: bpy.types.Scene) -> Any:
+    """Painting at work, as a button begins it; a window's timer would call `poll`."""
+    operators = import_module(f"{NAME}.operators")
+    out = operators.version_to_paint(operators.folder_of(scene), goes_on=False)
+    smoke = operators.source.smoke_of(scene, out)
+    look = operators.source.look_of(scene.vnca)
+    words = operators.request.paint_words(smoke, look, str(out), "6-7")
+    asked = operators._paint_job("paint", smoke, words, out)
+    operators.current = operators._start(bpy.context, asked, look)
+    return operators.current
+
+
+def until(job: Any, what: str, seconds: float = 60) -> None:
+    start = time.monotonic()
+    while job.poll() and job.what != what:
+        assert time.monotonic() - start < seconds
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("moment", [0.0, 0.3, 1.5, 3.0])
+def test_cancelling_takes_less_than_a_second_at_any_moment(
+    moment: float, scene: bpy.types.Scene, plume: bpy.types.Object
+) -> None:
+    scene.vnca.refine = 6
+    job = begin(scene)
+    start = time.monotonic()
+    while time.monotonic() - start < moment and job.poll():
+        time.sleep(0.02)
+    assert bpy.ops.vnca.cancel() == {"FINISHED"}
+    start = time.monotonic()
+    while job.poll():
+        time.sleep(0.02)
+    assert time.monotonic() - start < 1
+    assert job.state == "cancelled"
+    with pytest.raises(ProcessLookupError):
+        os.kill(job.pid, 0)
+    # And one can begin anew.
+    scene.vnca.refine = 1
+    assert bpy.ops.vnca.paint() == {"FINISHED"}
+
+
+def test_a_cancelled_painting_is_gone_on_with(
+    scene: bpy.types.Scene, plume: bpy.types.Object, folder: Path
+) -> None:
+    operators = import_module(f"{NAME}.operators")
+    scene.vnca.refine = 5
+    job = begin(scene)
+    until(job, "painting")
+    job.cancel()
+    while job.poll():
+        time.sleep(0.02)
+    (version,) = (folder / "out" / "Plume embers").iterdir()
+    assert operators.can_go_on(scene)
+    assert bpy.ops.vnca.paint(goes_on=True) == {"FINISHED"}
+    assert not operators.can_go_on(scene)
+    assert [path.name for path in sorted((version / "painted").iterdir())] == [
+        "plume_0006.vdb",
+        "plume_0007.vdb",
+    ]
+
+
+def test_nothing_is_gone_on_with_where_nothing_was_cancelled(
+    scene: bpy.types.Scene, plume: bpy.types.Object
+) -> None:
+    assert "there is no painting to go on with" in said(bpy.ops.vnca.paint, goes_on=True)
+
+
+def test_a_killed_worker_is_a_message(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
+    scene.vnca.refine = 6
+    job = begin(scene)
+    time.sleep(0.5)
+    os.kill(job.pid, signal.SIGKILL)
+    while job.poll():
+        time.sleep(0.02)
+    assert job.state == "failed"
+    assert "ended unexpectedly (signal 9)" in job.message
+    assert bpy.ops.vnca.log() == {"FINISHED"}
+    assert "vnca log" in bpy.data.texts
+
+
+def test_another_file_ends_the_work(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
+    scene.vnca.refine = 6
+    job = begin(scene)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert job.state == "cancelled"
+    with pytest.raises(ProcessLookupError):
+        os.kill(job.pid, 0)
+
+
+def test_a_worker_does_not_outlive_blender(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
+    scene.vnca.refine = 8
+    job = begin(scene)
+    time.sleep(1)
+    job._process.stdin.close()  # as the system does when Blender crashes
+    assert job._process.wait(timeout=10) != 0
+
+
+def test_what_vnca_refuses_is_its_message(
+    scene: bpy.types.Scene, plume: bpy.types.Object, folder: Path
+) -> None:
+    (folder / "smoke" / "plume_0007.vdb").write_bytes(b"no smoke")
+    assert "plume_0007.vdb" in said(bpy.ops.vnca.paint)
+    assert scene.vnca.result is None
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    scene: bpy.types.Scene, plume: bpy.types.Object, folder: Path
+) -> None:
+    (folder / "out").write_text("a file in the way")
+    assert "out" in said(bpy.ops.vnca.paint)
+
+
+def test_a_cache_that_is_read_only_is_painted(
+    scene: bpy.types.Scene, plume: bpy.types.Object, folder: Path
+) -> None:
+    for path in (folder / "smoke").glob("*.vdb"):
+        path.chmod(stat.S_IREAD)
+    (folder / "smoke").chmod(stat.S_IREAD | stat.S_IEXEC)
+    assert bpy.ops.vnca.paint() == {"FINISHED"}
+    assert len(list((folder / "smoke").iterdir())) == 2
+
+
+def test_a_scene_that_is_not_saved_has_no_folder(
+    scene: bpy.types.Scene, plume: bpy.types.Object
+) -> None:
+    scene.vnca.folder = "//vnca"
+    assert "Save the scene first" in said(bpy.ops.vnca.paint)
+
+
+def test_frames_that_were_removed_are_told(
+    scene: bpy.types.Scene, plume: bpy.types.Object, folder: Path
+) -> None:
+    for path in (folder / "smoke").glob("*.vdb"):
+        path.unlink()
+    assert "there is no such file" in said(bpy.ops.vnca.paint)
+
+
+def test_a_frame_without_a_file_has_no_preview(
+    scene: bpy.types.Scene, plume: bpy.types.Object
+) -> None:
+    scene.frame_set(20)
+    assert "no file for the frame 20; there are 6 to 7" in said(bpy.ops.vnca.preview)
+    scene.frame_start, scene.frame_end = 20, 30
+    assert "no files for the frames 20 to 30" in said(bpy.ops.vnca.paint)
+
+
+def test_a_domain_that_is_not_baked_says_so(scene: bpy.types.Scene, folder: Path) -> None:
+    domain = add_domain(scene, "plain", folder / "cache")
+    settings = domain.modifiers[0].domain_settings
+    scene.vnca.folder = str(folder / "out")
+    for path in (folder / "cache" / "data").iterdir():
+        path.unlink()
+    assert "nothing is baked" in said(bpy.ops.vnca.paint)
+    settings.cache_data_format = "UNI"
+    assert "not OpenVDB" in said(bpy.ops.vnca.paint)
+    settings.cache_data_format, settings.cache_directory = "OPENVDB", "//cache"
+    assert "save the scene first" in said(bpy.ops.vnca.paint)
+
+
+def test_nothing_chosen_is_a_message(scene: bpy.types.Scene) -> None:
+    assert "Choose the smoke" in said(bpy.ops.vnca.paint)
+    assert "neither a domain of gas nor a volume" in said(bpy.ops.vnca.use_active)
+
+
+def test_a_model_that_is_not_there_is_a_message(
+    scene: bpy.types.Scene, plume: bpy.types.Object, folder: Path
+) -> None:
+    scene.vnca.way = "MODEL"
+    assert "Choose a model" in said(bpy.ops.vnca.paint)
+    scene.vnca.model = str(folder / "gone.safetensors")
+    assert "there is no such model" in said(bpy.ops.vnca.paint)
+    scene.vnca.way = "PICTURE"
+    scene.vnca.model = ""
+    assert "Train first" in said(bpy.ops.vnca.paint)
+
+
+def test_training_says_what_it_needs(
+    scene: bpy.types.Scene,
+    plume: bpy.types.Object,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene.vnca.way = "PICTURE"
+    assert "Choose a picture" in said(bpy.ops.vnca.train)
+    scene.vnca.picture = str(folder / "gone.png")
+    assert "there is no such picture" in said(bpy.ops.vnca.train)
+    Path(scene.vnca.picture).write_bytes(b"")
+    monkeypatch.setenv("PATH", str(folder))
+    assert "Training needs Python with vnca and torch" in said(bpy.ops.vnca.train)
+    preferences = bpy.context.preferences.addons[NAME].preferences
+    preferences.python = str(folder)
+    try:
+        assert "no Python environment" in said(bpy.ops.vnca.train)
+        # Blender's own Python, which has no torch.
+        preferences.python = sys.executable
+        complaint = said(bpy.ops.vnca.check_training)
+        assert "torch" in complaint
+        assert "pip install" in complaint
+    finally:
+        preferences.python = ""
