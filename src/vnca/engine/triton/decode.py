@@ -102,8 +102,7 @@ class _Decode(torch.autograd.Function):
         ctx: Any, *grad_outputs: Tensor
     ) -> tuple[Tensor | None, ...]:
         gradient = grad_outputs[0].contiguous()
-        tensors = ctx.saved_tensors
-        state, rows, fractions, *weights = tensors
+        state, rows, fractions, *weights = tensors = ctx.saved_tensors
         points, cells = len(fractions), len(state) - 1
         sizes = _sizes(tensors, TILES[1])
         count = programs(points, TILES[1], state.device)
