@@ -3,7 +3,13 @@
 python benchmarks/styles/build.py SMOKE OUT NAME=RUN ...
 
 SMOKE is a frame that thumbnails are painted on, OUT the folder of the library, RUN the folder of a
-training. What a model tells of the smoke that it was trained on is left out: the library paints
+training: of a picture here, drawn by pictures.py, or in the package, each with
+
+    vnca train FRAME PICTURE --graft none --texture 4 --iterations 200 --pool.reseed-every 40 -s 1
+
+which takes a quarter of an hour on a core, and makes states live for 640 steps: as long as films
+are. Harvest and woodcut come from an earlier build: woodcut came out in blots by this one.
+What a model tells of the smoke that it was trained on is left out: the library paints
 other smoke.
 """
 

@@ -124,7 +124,7 @@ def test_smoke_without_velocity_is_measured_as_far_as_it_goes(
     assert json.loads(outcome.out) == measures
     unknown = {name for name, measure in measures.items() if measure["value"] is None}
     assert unknown == {
-        *("time.warp_short", "time.warp_long"),
+        *("structure.width", "time.warp_short", "time.warp_long"),
         *("motion.direction", "motion.magnitude", "motion.transport"),
     }
     assert "no velocity" in measures["motion.direction"]["reason"]
