@@ -112,7 +112,11 @@ def test_auto_takes_triton_on_a_gpu_and_says_so_once(capsys: pytest.CaptureFixtu
     [
         ({"_missing": "No module named 'triton'"}, "cuda", "package triton is not installed"),
         ({"_missing": None, "_interpreted": False}, "cpu", "on NVIDIA GPUs, not on cpu"),
-        ({"_missing": None, "_interpreted": False}, "cuda", "finds no usable GPU|built without CUDA"),
+        (
+            {"_missing": None, "_interpreted": False},
+            "cuda",
+            "finds no usable GPU|built without CUDA",
+        ),
     ],
 )
 def test_triton_asked_for_where_it_cannot_run_says_why(
