@@ -53,7 +53,8 @@ def test_quads_are_split_where_they_are_hollow(first: int) -> None:
 def test_area_and_winding_of_any_simple_polygon_are_kept(
     data: st.DataObject, corners: int, seed: int
 ) -> None:
-    gaps = data.draw(st.lists(st.floats(0.5, 2), min_size=corners, max_size=corners))
+    # None of half a turn or more, across which a side might cut others.
+    gaps = data.draw(st.lists(st.floats(0.7, 2), min_size=corners, max_size=corners))
     radii = data.draw(st.lists(st.floats(0.1, 10), min_size=corners, max_size=corners))
     flat = star(2 * np.pi * np.cumsum(gaps) / np.sum(gaps), np.array(radii))
     x, y, _ = flat.T
