@@ -35,8 +35,7 @@ import torch
 import triton
 
 from vnca.core.errors import VncaError
-from vnca.engine.native import step as native
-from vnca.engine import Compute, choose, device_named
+from vnca.engine import Compute, choose, device_named, native
 
 device = os.environ["DEVICE"]
 print(f"python {sys.version.split()[0]}, numpy {numpy.__version__}, triton {triton.__version__}")

@@ -32,6 +32,12 @@ def run(out: Path, *parts: str, **settings: str) -> subprocess.CompletedProcess[
     )
 
 
+def test_it_says_what_the_machine_has(tmp_path: Path) -> None:
+    done = run(tmp_path, "check")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "on cpu, auto takes native" in done.stdout
+
+
 @pytest.mark.slow
 def test_it_trains_paints_and_measures(tmp_path: Path) -> None:
     preset = tmp_path / "small.toml"
