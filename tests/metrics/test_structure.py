@@ -48,7 +48,7 @@ def likeness(picture: FloatArray, painted: FloatArray) -> Likeness:
     plain = np.full_like(painted, 0.214)
     pair = Pair(Viewpoint(0, 0), seen(painted), seen(plain))
     shorter = min(picture.shape[:2])
-    found = StructureMetric(picture).likeness([pair], StyleMetric(picture, shorter))
+    found = StructureMetric(StyleMetric(picture, shorter)).likeness([pair])
     assert found is not None
     return found
 
@@ -135,7 +135,7 @@ def test_views_that_show_too_little_say_nothing() -> None:
     empty = np.zeros((64, 64), np.float32)
     nothing = Seen(empty[..., None].repeat(3, -1), empty, empty)
     pair = Pair(Viewpoint(0, 0), nothing, nothing)
-    assert StructureMetric(picture).likeness([pair], StyleMetric(picture, SIZE)) is None
+    assert StructureMetric(StyleMetric(picture, SIZE)).likeness([pair]) is None
 
 
 def test_smoke_that_is_smaller_than_regions_and_patches_is_measured_by_the_rest() -> None:
@@ -145,7 +145,7 @@ def test_smoke_that_is_smaller_than_regions_and_patches_is_measured_by_the_rest(
     view = Seen(stripes(size=64) * where[..., None], where, where)
     plain = Seen(np.full((64, 64, 3), 0.214, np.float32) * where[..., None], where, where)
     pair = Pair(Viewpoint(0, 0), view, plain)
-    found = StructureMetric(picture).likeness([pair], StyleMetric(picture, SIZE))
+    found = StructureMetric(StyleMetric(picture, SIZE)).likeness([pair])
     assert found is not None
     assert found.regions is None
     assert np.isfinite([found.lines, found.contrast, found.direction, found.patches]).all()

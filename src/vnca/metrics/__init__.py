@@ -165,7 +165,7 @@ def survey(
     """
     seen_by = estimators()
     coherence = Coherence(seen_by["dis"])
-    by_structure = StructureMetric(metric.picture)
+    by_structure = StructureMetric(metric)
     frames, density, strip, style, structure, turn = [], [], [], {}, {}, None
     kept, compared = _spread(count, STRIP_FRAMES), _spread(count, STYLE_FRAMES)
     for at, painting in enumerate(paintings):
@@ -181,7 +181,7 @@ def survey(
             pairs = [setup.look_twice(painted, plain, viewpoint) for viewpoint in SIDES]
             if (found := score_style(metric, pairs)) is not None:
                 style[smoke.frame] = found
-                structure[smoke.frame] = by_structure.likeness(pairs, metric)
+                structure[smoke.frame] = by_structure.likeness(pairs)
                 for judge in judges:
                     judge.look(smoke.frame, pairs, metric)
         if at == count // 2:

@@ -11,16 +11,15 @@ from math import log2
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, gaussian_laplace
+from scipy.ndimage import gaussian_filter, gaussian_filter1d, gaussian_laplace
 from scipy.spatial import KDTree
 
 from vnca.core import AnyArray, BoolArray, FloatArray
 from vnca.features.strokes import distance_inside, find_ridges
 from vnca.metrics.setup import Pair
-from vnca.metrics.style import StyleMetric, normalised_score, perceived
+from vnca.metrics.style import StyleMetric, directions, normalised_score, perceived
+from vnca.metrics.style_score import FEWEST_OPAQUE
 
-FEWEST = 64
-"""Points without which a view says nothing about structure."""
 BINS = 16
 """Directions that are told apart, in half a turn."""
 PATCH = 7
@@ -106,46 +105,40 @@ class Likeness:
 class StructureMetric:
     """Compares structure with that of one style picture.
 
-    Attributes:
-        own: The picture's.
-
     Reference: Simakov et al. 2008 (nearest patches both ways).
     """
 
-    def __init__(self, picture: FloatArray) -> None:
-        """Prepare a picture, linear RGB `[r, c, 3]`, as large as its strokes are to be."""
+    def __init__(self, metric: StyleMetric) -> None:
+        """Prepare the picture of `metric`, as large as it is there."""
+        self._metric, picture = metric, metric.picture
         random = np.random.default_rng(_SEED)
-        self.own = structure(picture)
         self._side = max(4, min(picture.shape[:2]) // _REGIONS)
         everywhere = np.ones(picture.shape[:2], dtype=bool)
         colours = perceived(picture)
-        found = random.standard_normal((6, _DIRECTIONS))
-        self._mix = found / np.linalg.norm(found, axis=0)
-        self._regions = self._told(colours, everywhere)
+        self._mix = directions(random, 6, _DIRECTIONS)
+        self._regions = self._in_regions(colours, everywhere)
         patches = _patches(colours, everywhere, _PATCHES, random)
         self._mean = patches.mean(0)
         axes = np.linalg.eigh(np.cov((patches - self._mean).T))[1]
         self._axes = axes[:, -_AXES:]
         self._patches = (patches - self._mean) @ self._axes
         self._tree = KDTree(self._patches)
+        # Every other patch is asked of the rest. They overlap: parts of it could not be nearer.
+        rest = self._patches[1::2]
+        self._nearest = _apart(self._patches[::2][:_ASKED], rest, KDTree(rest))
 
-    def likeness(self, pairs: Sequence[Pair], metric: StyleMetric) -> Likeness | None:
-        """Compare views of a frame; None where too little is opaque in all of them.
-
-        Args:
-            pairs: The views.
-            metric: Has the picture, as large as that which was prepared.
-        """
-        pairs = [pair for pair in pairs if pair.where.sum() >= FEWEST]
+    def likeness(self, pairs: Sequence[Pair]) -> Likeness | None:
+        """Compare views of a frame; None where too little is opaque in all of them."""
+        pairs = [pair for pair in pairs if pair.where.sum() >= FEWEST_OPAQUE]
         if not pairs:
             return None
-        behind = metric.background
+        behind = self._metric.background
         painted = [(pair.painted.over(behind), pair.where) for pair in pairs]
         plain = [(pair.plain.over(behind), pair.where) for pair in pairs]
         parts = [
             part
             for seed, (_, where) in enumerate(painted)
-            for part in metric.cutouts(where, 1, seed)
+            for part in self._metric.cutouts(where, 1, seed)
         ]
         found = [structure(*view) for view in painted]
         # Of parts of the picture, for narrow smoke shows fewer and shorter lines than all of it.
@@ -162,21 +155,20 @@ class StructureMetric:
             ),
             regions=None if None in regions else normalised_score(*([r] for r in regions)),  # pyright: ignore[reportArgumentType]
             patches=normalised_score(
-                [self._by_patches(painted)], [self._by_patches(plain)], [self._halves()]
+                [self._by_patches(painted)], [self._by_patches(plain)], [self._nearest]
             ),
         )
 
     def _by_regions(self, views: Sequence[tuple[FloatArray, BoolArray]]) -> float | None:
-        """Sliced Wasserstein distance of what regions of the views are told by."""
-        told = [self._told(perceived(picture), where) for picture, where in views]
-        told = np.concatenate(told)
-        if len(told) < _REGIONS or len(self._regions) == 0:
+        """Sliced Wasserstein distance of what `_in_regions` finds in the views."""
+        found = np.concatenate([self._in_regions(perceived(p), where) for p, where in views])
+        if len(found) < _REGIONS or len(self._regions) == 0:
             return None
         at = np.linspace(0, 1, 64)
-        one, other = (np.quantile(some @ self._mix, at, axis=0) for some in (told, self._regions))
+        one, other = (np.quantile(some @ self._mix, at, axis=0) for some in (found, self._regions))
         return float(np.abs(one - other).mean())
 
-    def _told(self, colours: AnyArray, where: BoolArray) -> AnyArray:
+    def _in_regions(self, colours: AnyArray, where: BoolArray) -> AnyArray:
         """Mean and deviation of the colours in squares that are shown whole, `[n, 6]`."""
         side = self._side
         if min(where.shape) < side:
@@ -191,22 +183,15 @@ class StructureMetric:
         random = np.random.default_rng(_SEED)
         many = _ASKED // len(views)
         asked = [_patches(perceived(p), where, many, random) for p, where in views]
-        return self._apart((np.concatenate(asked) - self._mean) @ self._axes, self._patches)
+        return _apart((np.concatenate(asked) - self._mean) @ self._axes, self._patches, self._tree)
 
-    def _halves(self) -> float:
-        """How far patches of the picture are from others of it that they do not overlap, at most.
 
-        Every other one is asked of the rest: near ones are among them, so this is a lower bound.
-        """
-        return self._apart(self._patches[::2][:_ASKED], self._patches[1::2])
-
-    def _apart(self, asked: AnyArray, known: AnyArray) -> float:
-        """Mean distance of patches to their nearest, both ways."""
-        if len(asked) == 0:
-            return 0.0
-        tree = self._tree if known is self._patches else KDTree(known)
-        there, back = tree.query(asked)[0], KDTree(asked).query(known)[0]
-        return float(np.mean(there) + np.mean(back))
+def _apart(asked: AnyArray, known: AnyArray, tree: KDTree) -> float:
+    """Mean distance of patches to their nearest, both ways; `tree` is that of `known`."""
+    if len(asked) == 0:
+        return 0.0
+    there, back = tree.query(asked)[0], KDTree(asked).query(known)[0]
+    return float(np.mean(there) + np.mean(back))
 
 
 def _tensor(colours: AnyArray, shown: BoolArray, blur: float) -> tuple[AnyArray, ...]:
@@ -218,14 +203,10 @@ def _tensor(colours: AnyArray, shown: BoolArray, blur: float) -> tuple[AnyArray,
 
     rows, columns = slope(0), slope(1)
     xx, yy, xy = (
-        _blurred((one * other).sum(-1), _AROUND * blur)
+        gaussian_filter((one * other).sum(-1), _AROUND * blur)
         for one, other in ((columns, columns), (rows, rows), (rows, columns))
     )
     return xx - yy, 2 * xy, xx + yy
-
-
-def _blurred(values: AnyArray, blur: float) -> AnyArray:
-    return gaussian_filter1d(gaussian_filter1d(values, blur, axis=0), blur, axis=1)
 
 
 def _contrast(lightness: AnyArray, inside: AnyArray) -> float:

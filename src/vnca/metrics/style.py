@@ -123,7 +123,7 @@ class StyleMetric:
         self.picture = resize(picture, round(rows * factor), round(columns * factor)).clip(0, 1)
         self.background = self.picture.mean((0, 1))
         random = np.random.default_rng(_SEED)
-        self._hues = _directions(random, 3, SLICES)
+        self._hues = directions(random, 3, SLICES)
         colours = perceived(self.picture)
         everywhere = np.ones(self.picture.shape[:2], dtype=bool)
         self._palette = _Distribution.of(colours[everywhere] @ self._hues)
@@ -211,7 +211,7 @@ class _Texture(NamedTuple):
         """
         strengths, axes = np.linalg.eigh(np.atleast_2d(np.cov(seen.T)))
         floor = _WEAKEST * strengths[-1] or 1.0
-        mix = axes / np.sqrt(strengths + floor) @ _directions(random, FILTERS, SLICES)
+        mix = axes / np.sqrt(strengths + floor) @ directions(random, FILTERS, SLICES)
         mixed = torch.einsum("fs,fcij->scij", torch.from_numpy(mix.astype(np.float32)), filters)
         return cls(mixed, _Distribution.of(seen @ mix))
 
@@ -289,7 +289,7 @@ def _filters(random: np.random.Generator) -> Tensor:
     return torch.from_numpy(filters.astype(np.float32) / FILTER_SIZE)
 
 
-def _directions(random: np.random.Generator, size: int, count: int) -> FloatArray:
+def directions(random: np.random.Generator, size: int, count: int) -> FloatArray:
     """Unit vectors in columns, `[size, count]`."""
-    directions = random.standard_normal((size, count))
-    return (directions / np.linalg.norm(directions, axis=0)).astype(np.float32)
+    drawn = random.standard_normal((size, count))
+    return (drawn / np.linalg.norm(drawn, axis=0)).astype(np.float32)
