@@ -13,7 +13,7 @@ import numpy as np
 
 from vnca.bench import peak_mb
 from vnca.bench.contenders import smoke
-from vnca.bench.stylize import random_rule
+from vnca.bench.stylize import random_rule, sequence_painter
 from vnca.core import Box, Index
 from vnca.core.lattice import Lattice
 from vnca.core.volume import Volume
@@ -79,18 +79,9 @@ def measure_painting(
             config = StylizeConfig(steps_per_frame=case.steps, warmup=0)
             compute = Compute("auto", device, precision, threads)
             roll = Roll(random_rule(case.hidden), config, case.box, compute)
-            painter = Painter(
-                sequence,
-                Path(folder) / precision,
-                roll,
-                lattice,
-                SmokeFormat(),
-                colour_grids=("Cd",),
-                on_error="stop",
-                conditions={},
-                tell=lambda line: None,
-            )
-            painter.out.mkdir()
+            out = Path(folder) / precision
+            out.mkdir()
+            painter = sequence_painter(sequence, roll, lattice, SmokeFormat(), out)
             taken: list[tuple[float, float]] = []
             peak = peak_mb(lambda kept=taken, of=painter: kept.extend(_times(of)), "cpu")
             counted, busy = zip(*taken[1:], strict=True)

@@ -155,7 +155,10 @@ def measure_stylizing(
         works: dict[tuple[str, bool], Callable[[], object]] = {}
         for name, roll in rolls.items():
             works[name, False] = partial(_compute, roll, painted.volumes)
-            works[name, True] = partial(_paint, _painter(painted, roll, Path(folder)))
+            painter = sequence_painter(
+                painted.sequence, roll, painted.lattice, painted.smoke, Path(folder)
+            )
+            works[name, True] = partial(_paint, painter)
         begins = {key: partial(_ready, work) for key, work in works.items()}
         times = in_turns(begins, "cpu", repeats)
         peaks = {key: peak_mb(work, "cpu") for key, work in works.items()}
@@ -210,13 +213,16 @@ def _compute(roll: Roll, volumes: Sequence[Volume]) -> list[int]:
     return cells
 
 
-def _painter(painted: PaintedSequence, roll: Roll, folder: Path) -> Painter:
+def sequence_painter(
+    sequence: FrameSequence, roll: Roll, lattice: Lattice, smoke: SmokeFormat, folder: Path
+) -> Painter:
+    """What paints a sequence into a folder, and stops at what cannot be read."""
     return Painter(
-        painted.sequence,
+        sequence,
         folder,
         roll,
-        painted.lattice,
-        painted.smoke,
+        lattice,
+        smoke,
         colour_grids=("Cd",),
         on_error="stop",
         conditions={},
