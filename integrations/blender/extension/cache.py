@@ -103,15 +103,3 @@ def frames(folder: Path, kind: str) -> dict[int, Path]:
 def config_path(folder: Path, number: int) -> Path:
     """What the simulator notes of a frame."""
     return folder / "config" / f"config_{number:04d}.uni"
-
-
-def describe_missing(wanted: range, there: dict[int, Path]) -> str:
-    """Which frames are missing, as `3, 7-9`; empty if none is."""
-    missing = [number for number in wanted if number not in there]
-    runs: list[list[int]] = []
-    for number in missing:
-        if runs and runs[-1][1] == number - 1:
-            runs[-1][1] = number
-        else:
-            runs.append([number, number])
-    return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in runs)

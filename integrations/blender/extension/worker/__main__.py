@@ -78,16 +78,25 @@ def latest(folder, pattern):
     return max(paths, key=lambda path: path.stat().st_mtime_ns, default=None)
 
 
+def stage(job):
+    """Put cells where they belong, if they are not; the folder of what was staged, if it was."""
+    if not job["staged"]:
+        return None
+    import staging
+
+    folder = Path(job["sequence"]).parent
+    staging.stage(job["staged"], folder, tell)
+    return folder
+
+
 def paint(job):
     """Paint frames, and show the latest."""
     import picture
+    import staging
 
     from vnca.cli import main
 
-    if job["staged"]:
-        import staging
-
-        staging.stage(job["staged"], Path(job["sequence"]).parent, tell)
+    folder = stage(job)
     painted, shown = Path(job["out"]) / "painted", Path(job["picture"])
 
     def show(path=None):
@@ -104,8 +113,8 @@ def paint(job):
         last = latest(painted, "*.vdb")
         show(last)
         tell("finished", files=files, picture=str(shown), **picture.facts(last))
-        if job["staged"]:
-            staging.clear(Path(job["sequence"]).parent)
+        if folder is not None:
+            staging.clear(folder)
     return code
 
 
@@ -113,10 +122,7 @@ def train(job):
     """Learn a style, and show what vnca shows of it."""
     from vnca.cli import main
 
-    if job["staged"]:
-        import staging
-
-        staging.stage(job["staged"], Path(job["sequence"]).parent, tell)
+    stage(job)
     run = Path(job["out"])
 
     def show():

@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image
 
 import vnca
+from vnca.io.picture import to_srgb8
 
 SIZE = 256
 """Pixels of the longer side, at most."""
@@ -48,7 +49,7 @@ def draw(path, out):
             thick = density.to_dense(box)[0].astype(np.float32)
             depth = thick * extinction * density.transform.voxel_size[0]
             pixels = _seen(*_upright(depth, colour, up))
-    image = Image.fromarray(np.round(255 * _srgb(pixels)).astype(np.uint8))
+    image = Image.fromarray(to_srgb8(pixels))
     scale = SIZE / max(image.size)
     size = [max(round(side * scale), 1) for side in image.size]
     temporary = Path(out).with_suffix(".part")
@@ -73,9 +74,3 @@ def _seen(depth, colour):
     through = np.exp(-depth.sum(axis=1))
     picture = seen + BACKGROUND * through[..., None]
     return picture.transpose(1, 0, 2)[::-1]
-
-
-def _srgb(linear):
-    linear = np.clip(linear, 0, 1)
-    power = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, 12.92 * linear, power)
