@@ -180,3 +180,36 @@ def test_cost_follows_the_smoke_however_far_a_sequence_reaches() -> None:
         np.testing.assert_array_equal(carried, state)
         assert np.count_nonzero(neighbours < len(domain)) == 2 * (12 + 11 + 11) ** 3
     assert peaks[1] < 1.1 * peaks[0]
+
+
+def test_what_is_carried_by_whole_cells_arrives_as_it_was() -> None:
+    old = Domain.from_mask(np.ones((5, 4, 6), bool), (0, 0, 0))
+    new = Domain(old.cells + np.array([2, 0, 1], np.int32), old.box.grown(2))
+    state = np.random.default_rng(0).random((len(old) + 1, 3)).astype(np.float32)
+    old = Domain(old.cells, new.box)
+    rows, shares = old.sources(new, np.broadcast_to(np.float32([2, 0, 1]), (len(new), 3)))
+    np.testing.assert_array_equal((shares[..., None] * state[rows]).sum(0), state[:-1])
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 1000), st.floats(-3, 3), st.sampled_from(["replicate", "circular"]))
+def test_a_constant_state_stays_constant_wherever_it_is_carried(
+    seed: int, speed: float, border: str
+) -> None:
+    domain = random_domain(seed, (6, 5, 7), border)
+    moved = np.random.default_rng(seed).standard_normal((len(domain), 3)).astype(np.float32)
+    rows, shares = domain.sources(domain, np.float32(speed) * moved)
+    np.testing.assert_allclose(shares.sum(0), 1, rtol=1e-6)
+    alive = np.append(np.ones(len(domain), np.float32), 0)
+    np.testing.assert_allclose((shares * alive[rows]).sum(0), 1, rtol=1e-6)
+
+
+def test_a_cell_with_nothing_upstream_keeps_its_own_state_and_a_new_one_has_none() -> None:
+    old = Domain.from_mask(np.ones((4, 4, 4), bool), (0, 0, 0), box=Box((-9, -9, -9), (9, 9, 9)))
+    new = Domain.from_mask(np.ones((4, 4, 5), bool), (0, 0, 0), box=old.box)
+    rows, shares = old.sources(new, np.full((len(new), 3), [0, 0, 7], np.float32))
+    state = np.append(np.arange(len(old)) + 1, 0)
+    carried = (shares * state[rows]).sum(0)
+    expected = old.carry(state, new)[:-1]
+    np.testing.assert_array_equal(carried, expected)
+    assert (expected == 0).sum() == 16

@@ -13,7 +13,7 @@ from vnca.core.field import Field
 from vnca.core.volume import Volume
 from vnca.io import velocity as in_fields
 from vnca.io import velocity as interpolation
-from vnca.io.velocity import cells_per_frame, fit_velocity_scale
+from vnca.io.velocity import cells_per_frame, fit_velocity_scale, likely_velocity_scale
 
 SHAPE = (4, 3, 5)
 EVERYWHERE = np.ones(SHAPE, np.bool_)
@@ -202,6 +202,19 @@ def scaled(volume: Volume, factor: float) -> Volume:
 def test_a_wrong_velocity_scale_is_recovered(scale: float, refilled: bool) -> None:
     first, second = swirl(0, refilled=refilled), swirl(0.2, refilled=refilled)
     assert fit_velocity_scale(scaled(first, 1 / scale), second) == pytest.approx(scale, rel=0.03)
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1, 1), (0.8, 1), (24, 1 / 32), (0.1, 8)])
+def test_units_that_are_far_off_are_noticed_and_others_are_not(factor: float, told: float) -> None:
+    found = likely_velocity_scale(scaled(swirl(0), factor), swirl(0.2))
+    assert found == 1 if told == 1 else found / told in (0.5, 1, 2)
+
+
+def test_nothing_is_noticed_where_nothing_can_be_seen() -> None:
+    first = swirl(0)
+    assert likely_velocity_scale(first, first) == 1
+    assert likely_velocity_scale(replace(first, velocity=None), swirl(0.2)) == 1
+    assert likely_velocity_scale(scaled(first, 0), swirl(0.2)) == 1
 
 
 def test_the_fit_follows_boxes_that_move() -> None:

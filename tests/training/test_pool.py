@@ -32,7 +32,8 @@ def test_slots_do_not_share_a_state() -> None:
     states = pool(size=8)
     slot = states.draw(1).slot
     states.put(slot, torch.ones_like(SEED))
-    for other, _, state in (states.draw(2) for _ in range(50)):
+    for drawn in (states.draw(2) for _ in range(50)):
+        other, state = drawn.slot, drawn.state
         assert torch.equal(state, torch.ones_like(SEED) if other == slot else SEED)
 
 
@@ -63,9 +64,9 @@ def test_each_seed_begins_a_life_that_no_state_has_led() -> None:
     states = pool(size=2, reseed_every=10)
     lives = []
     for iteration in range(1, 60):
-        slot, life, _ = states.draw(iteration)
-        states.put(slot, torch.ones_like(SEED))
-        lives.append(life)
+        drawn = states.draw(iteration)
+        states.put(drawn.slot, torch.ones_like(SEED))
+        lives.append(drawn.life)
     assert set(lives[:9]) == {0, 1}
     assert set(lives) == set(range(2 + 5))
 
@@ -77,6 +78,17 @@ def test_lives_go_on_from_a_snapshot() -> None:
     again.restore(states.snapshot())
     again._random = np.random.default_rng()
     again._random.bit_generator.state = states._random.bit_generator.state
-    assert [states.draw(i)[:2] for i in range(9, 30)] == [again.draw(i)[:2] for i in range(9, 30)]
+    assert [states.draw(i)[:3] for i in range(9, 30)] == [again.draw(i)[:3] for i in range(9, 30)]
+
+
+def test_a_state_is_as_old_as_the_rollouts_since_its_seed() -> None:
+    states = pool(size=1, reseed_every=8)
+    ages = []
+    for iteration in range(1, 18):
+        ages.append(states.draw(iteration).age)
+        states.put(0, torch.ones_like(SEED))
+    assert ages == [*range(7), *range(8), 0, 1]
+    states.put(0, torch.full_like(SEED, float("nan")))
+    assert states.draw(1).age == 0
     with pytest.raises(ValueError, match="lives"):
         pool(size=3).restore(states.snapshot())

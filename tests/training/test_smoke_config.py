@@ -4,6 +4,8 @@ from typing import Any
 import pytest
 
 from vnca.core.errors import OptionError
+from vnca.losses import MotionConfig
+from vnca.rule import RuleConfig
 from vnca.training.config import PoolConfig, SmokeConfig, ViewConfig
 
 
@@ -17,6 +19,8 @@ from vnca.training.config import PoolConfig, SmokeConfig, ViewConfig
         (SmokeConfig, "milestones", (100.0, 200.0)),
         (SmokeConfig, "shortest_rollout", 0),
         (SmokeConfig, "overflow", math.nan),
+        (SmokeConfig, "steadiness", -1.0),
+        (SmokeConfig, "mass", math.inf),
         (SmokeConfig, "texture", -1.0),
         (SmokeConfig, "texture", 1001.0),
         (SmokeConfig, "seed", -1),
@@ -51,3 +55,10 @@ def test_the_learning_rate_rises_to_its_height_and_falls_at_each_milestone() -> 
     )
     rates = [config.rate(iteration) for iteration in range(10)]
     assert rates == pytest.approx([0.2, 0.4, 0.6, 0.8, 0.8, 0.4, 0.4, 0.4, 0.2, 0.2])
+
+
+def test_a_pattern_is_not_both_carried_and_taught_to_move() -> None:
+    carried = RuleConfig(transport=True)
+    with pytest.raises(OptionError, match=r"motion\.weight` 1: .*transport"):
+        SmokeConfig(rule=carried)
+    SmokeConfig(rule=carried, motion=MotionConfig(weight=0.0))

@@ -21,7 +21,7 @@ from vnca.io import SmokeFormat, read_smoke, write_smoke
 from vnca.io.sequence import FrameSequence, find_frames
 from vnca.io.smoke_format import on_one_lattice
 from vnca.painting import Roll, StylizeConfig
-from vnca.painting.frames import StillSmoke, require_dense
+from vnca.painting.frames import VelocityCheck, require_dense
 from vnca.painting.painter import Painter
 from vnca.rule import Rule, RuleConfig, Scales
 from vnca.simulation import simulate
@@ -75,8 +75,8 @@ class PaintedSequence:
             VncaError: If a frame cannot be read, or nothing would be painted.
         """
         frames = (read_smoke(f.path, smoke, frame=f.number) for f in sequence)
-        still = StillSmoke(rule, smoke, tell)
-        volumes = list(on_one_lattice(still.watched(frames, [f.path for f in sequence])))
+        check = VelocityCheck(rule, smoke, tell)
+        volumes = list(on_one_lattice(check.watched(frames, [f.path for f in sequence])))
         densities = (volume.density_field.values for volume in volumes)
         require_dense(densities, rule.scales.density, str(sequence[0].path.parent))
         config = StylizeConfig(steps_per_frame=steps, warmup=0)

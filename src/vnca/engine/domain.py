@@ -17,6 +17,9 @@ from vnca.engine.automaton import OFFSETS, HashArray, hash_cells
 MOST_CELLS = 2**27
 """A larger box (512³) may not be active as a whole."""
 
+_LEAST_SHARE = 0.25
+"""What must be alive upstream of a cell for it to have its state from there."""
+
 Border = Literal["replicate", "circular"]
 DomainKind = Literal["active", "box"]
 """Cells near the smoke, or all cells of its box."""
@@ -167,6 +170,34 @@ class Domain:
         """The state on `other`: cells alive in both keep theirs, new ones start from zero."""
         rows = self.rows.gather(other.cells)
         return state[np.append(rows, np.int32(len(self)))]
+
+    def sources(self, other: "Domain", moved: AnyArray) -> tuple[IntArray, FloatArray]:
+        """Where the cells of `other` have their state from, once it has been moved: upstream.
+
+        A state there is interpolated linearly between the cells that are alive; their shares are
+        scaled to add up to one. A cell that would have little or nothing from them keeps its own.
+
+        Args:
+            other: The cells that want a state.
+            moved: `[m, 3]`, by how much it has come to each of them, cells.
+
+        Returns:
+            Rows `[8, m]` of the state here, n for the outside, and their shares `[8, m]`.
+
+        Reference: Stam 1999, section 2.3 (semi-Lagrangian advection).
+        """
+        rows, upper = self.corners(other.cells - moved)
+        shares = np.ones(rows.shape, np.float32)
+        for corner, share in zip(product((0, 1), repeat=3), shares, strict=True):
+            for axis, side in enumerate(corner):
+                share *= upper[:, axis] if side else 1 - upper[:, axis]
+        shares *= rows < len(self)
+        total = shares.sum(axis=0)
+        from_outside = total < _LEAST_SHARE
+        shares /= np.where(from_outside, 1, total)
+        shares[:, from_outside] = np.eye(8, 1, dtype=np.float32)
+        rows[0, from_outside] = self.rows.gather(other.cells[from_outside])
+        return rows, shares
 
 
 def subdivided(cells: IntArray, neighbours: IntArray, factor: int) -> tuple[IntArray, FloatArray]:

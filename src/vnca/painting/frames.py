@@ -1,7 +1,7 @@
 """The frames of a sequence on their way to a rule: read ahead, and looked at.
 
-Of smoke without velocity the user is told once; smoke too thin to be painted is refused, as with
-densities in another unit than the rule was taught in.
+Of smoke without velocity, or with one in other units than it moves by, the user is told once. Smoke
+too thin to be painted is refused, as with densities in another unit than the rule was taught in.
 """
 
 from collections import deque
@@ -16,9 +16,12 @@ from vnca.core.errors import SequenceError
 from vnca.core.volume import Volume
 from vnca.io import SmokeFormat, missing_velocity
 from vnca.io.smoke_format import NO_VELOCITY
+from vnca.io.velocity import likely_velocity_scale
 from vnca.rule import SMOKE_THRESHOLD, Rule, density_scale
 
 T = TypeVar("T")
+PAIRS_CHECKED = 3
+"""Frames whose velocity is compared with how their smoke moves."""
 
 
 def read_ahead(
@@ -45,22 +48,24 @@ def read_ahead(
 
 
 @dataclass
-class StillSmoke:
-    """Looks for smoke without velocity among what a rule paints.
+class VelocityCheck:
+    """Looks at the velocity of what a rule paints: is there any, and does it move the smoke?
 
     Attributes:
         rule: The rule, which may be conditioned on velocity.
         format: How files are read: velocity may not be wanted.
-        tell: Is given the line for the user.
+        tell: Is given lines for the user, each at most once.
     """
 
     rule: Rule
     format: SmokeFormat
     tell: Callable[[str], None]
     _is_told: bool = field(default=False, init=False)
+    _pairs: int = field(default=PAIRS_CHECKED, init=False)
+    _before: Volume | None = field(default=None, init=False)
 
     def look(self, smoke: Volume, path: Path | None) -> None:
-        """Tell of a frame, the first without velocity; and what of its file could be that.
+        """Tell of a frame, the first without velocity; and of one whose units seem to be others.
 
         Args:
             smoke: The frame.
@@ -70,16 +75,39 @@ class StillSmoke:
             FileFormatError: If the file cannot be read any more.
         """
         if (
-            self._is_told
-            or not self.rule.config.is_conditioned_on("velocity")
-            or self.format.velocity_grid == NO_VELOCITY
-            or smoke.velocity_field is not None
+            self.format.velocity_grid == NO_VELOCITY
             or smoke.box.is_empty
+            or not (self.rule.config.transport or self.rule.config.is_conditioned_on("velocity"))
         ):
+            return
+        if smoke.velocity_field is None:
+            self._tell_of_none(smoke, path)
+        elif self._pairs > 0:
+            self._compare(smoke, path)
+
+    def _tell_of_none(self, smoke: Volume, path: Path | None) -> None:
+        if self._is_told:
             return
         self._is_told = True
         missing = f"frame {smoke.frame}: no velocity" if path is None else missing_velocity(path)
         self.tell(f"{missing}; frames without are painted as if their smoke rested")
+
+    def _compare(self, smoke: Volume, path: Path | None) -> None:
+        before, self._before = self._before, smoke
+        if before is None or smoke.frame != before.frame + 1:
+            return
+        self._pairs -= 1
+        scale = likely_velocity_scale(before, smoke)
+        if scale != 1:
+            self._pairs = 0
+            off = f"{1 / scale:.0f} times too fast" if scale < 1 else f"{scale:.0f} times too slow"
+            self.tell(
+                f"{path or f'frame {smoke.frame}'}: the velocity seems about {off} for how the "
+                "smoke moves, and carries patterns along like that; check `velocity_units`, `fps` "
+                "and `time_scale`, or set `velocity_scale` fit"
+            )
+        if self._pairs == 0:
+            self._before = None
 
     def watched(self, frames: Iterable[Volume], paths: Iterable[Path | None]) -> Iterator[Volume]:
         """Frames in order, each looked at.

@@ -27,7 +27,7 @@ from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import up_axis_of
 from vnca.io.vdb import VdbFile
 from vnca.painting import Roll, RollState
-from vnca.painting.frames import StillSmoke, read_ahead
+from vnca.painting.frames import VelocityCheck, read_ahead
 from vnca.painting.unfinished import Source, Unfinished
 
 OnError = Literal["stop", "skip", "hold"]
@@ -102,11 +102,11 @@ class Painter:
     tell: Callable[[str], None]
     refine: int = 1
     facts: Mapping[str, str | int | float] = field(default_factory=dict)
-    _still: StillSmoke = field(init=False)
+    _velocity: VelocityCheck = field(init=False)
 
     def __post_init__(self) -> None:
-        still = StillSmoke(self.roll.rule, self.smoke, self.tell)
-        object.__setattr__(self, "_still", still)
+        check = VelocityCheck(self.roll.rule, self.smoke, self.tell)
+        object.__setattr__(self, "_velocity", check)
 
     @property
     def unfinished_path(self) -> Path:
@@ -244,7 +244,7 @@ class Painter:
 
     def _write(self, frame: Frame, read: _Read, state: RollState) -> RollState:
         """Paint smoke to the file of a frame; the state after it."""
-        self._still.look(read.smoke, read.frame.path)
+        self._velocity.look(read.smoke, read.frame.path)
         painting = self.roll.paint(read.smoke, state)
         read.require_unchanged()
         if frame == self.sequence[0]:

@@ -53,6 +53,7 @@ class Unfinished:
             "conditions": self.conditions,
             "sources": self.sources,
             "steps_done": self.state.steps_done,
+            "frame": self.state.frame,
         }
         tensors = {
             "cells": np.ascontiguousarray(self.state.cells),
@@ -80,6 +81,7 @@ class Unfinished:
                     file.get_tensor("cells"),
                     file.get_tensor("values"),
                     int(described["steps_done"]),
+                    described["frame"],
                     roll,
                 )
         except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
@@ -103,7 +105,7 @@ def _require_same(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any
             )
 
 
-def _state(cells: Any, values: Any, steps_done: int, roll: Roll) -> RollState:
+def _state(cells: Any, values: Any, steps_done: int, frame: Any, roll: Roll) -> RollState:
     """The state, after a look at what a damaged file could do harm with.
 
     Raises:
@@ -118,4 +120,5 @@ def _state(cells: Any, values: Any, steps_done: int, roll: Roll) -> RollState:
     if len(cells) and not ((cells >= box.lower) & (cells < box.upper)).all():
         raise ValueError(f"cells beyond {box}")
     outside = np.zeros((1, values.shape[1]), dtype=np.float32)
-    return RollState(cells, np.concatenate([values, outside]), steps_done)
+    values = np.concatenate([values, outside])
+    return RollState(cells, values, steps_done, None if frame is None else int(frame))

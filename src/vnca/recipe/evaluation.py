@@ -29,7 +29,7 @@ from vnca.metrics.setup import SIZE, Setup
 from vnca.metrics.style import SMALLEST, StyleMetric
 from vnca.metrics.style_score import Judge
 from vnca.painting import StylizeConfig, stylize
-from vnca.painting.frames import StillSmoke, require_dense
+from vnca.painting.frames import VelocityCheck, require_dense
 from vnca.recipe import PICTURE_CELLS, SILENT, Watch, applied, tracked
 from vnca.recipe.sequence import open_sequence, placed, region_of, sequence_region, volumes
 from vnca.rule.model import Model
@@ -188,8 +188,8 @@ def evaluate(
         raise OptionError("`frames`: chooses among files; give the volumes that are wanted")
     given, region = region_of(sequence)
 
-    def read(still: StillSmoke | None) -> Iterator[Volume]:
-        return iter(given) if still is None else still.watched(given, [None] * len(given))
+    def read(check: VelocityCheck | None) -> Iterator[Volume]:
+        return iter(given) if check is None else check.watched(given, [None] * len(given))
 
     return run(
         asked,
@@ -208,7 +208,7 @@ class _Smoke:
 
     region: Region
     count: int
-    read: Callable[[StillSmoke | None], Iterator[Volume]]
+    read: Callable[[VelocityCheck | None], Iterator[Volume]]
     first: str
     folder: str
     where: str
@@ -250,7 +250,7 @@ def run(
     pixels = _checked_size(width(setup.refined(cells)), f"`size` {options.size}")
     setup, metric = setup.refined(refine), StyleMetric(picture, pixels)
     paintings = stylize(
-        given.read(StillSmoke(rule, options.smoke, watch.note)),
+        given.read(VelocityCheck(rule, options.smoke, watch.note)),
         rule,
         options.config,
         box=given.region.box,
@@ -280,8 +280,8 @@ def _files(sequence: FrameSequence, options: EvaluateRun, watch: Watch) -> _Smok
     region = sequence_region(sequence, smoke, watch)
     first = sequence[0].path
 
-    def read(still: StillSmoke | None) -> Iterator[Volume]:
-        return volumes(sequence, at_rest if still is None else smoke, region.lattice, still)
+    def read(check: VelocityCheck | None) -> Iterator[Volume]:
+        return volumes(sequence, at_rest if check is None else smoke, region.lattice, check)
 
     folder = first.resolve().parent.name
     return _Smoke(region, len(sequence), read, first.name, folder, str(first.parent))

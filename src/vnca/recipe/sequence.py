@@ -18,7 +18,7 @@ from vnca.core.volume import Volume
 from vnca.io import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
 from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
 from vnca.io.smoke_format import NO_VELOCITY, Extent, on_lattice, on_one_lattice
-from vnca.painting.frames import StillSmoke, read_ahead, require_dense
+from vnca.painting.frames import VelocityCheck, read_ahead, require_dense
 from vnca.painting.painter import BROKEN
 from vnca.recipe import Watch
 from vnca.rule import Rule
@@ -230,7 +230,7 @@ def volumes(
     sequence: FrameSequence,
     smoke: SmokeFormat,
     lattice: Lattice | None = None,
-    still: StillSmoke | None = None,
+    check: VelocityCheck | None = None,
 ) -> Iterator[Volume]:
     """The frames in order, as `read_smoke` gives them; the next is read while one is used.
 
@@ -238,8 +238,8 @@ def volumes(
         sequence: The frames.
         smoke: How they are read.
         lattice: On whose cells they are wanted; each has its own unless given.
-        still: Is shown each of them.
+        check: Is shown each of them.
     """
     loads = (partial(read_smoke, f.path, smoke, frame=f.number, lattice=lattice) for f in sequence)
     read = read_ahead(loads)
-    return read if still is None else still.watched(read, [frame.path for frame in sequence])
+    return read if check is None else check.watched(read, [frame.path for frame in sequence])

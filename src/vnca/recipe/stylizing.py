@@ -17,7 +17,7 @@ from vnca.io import with_fitted_scale
 from vnca.io.sequence import find_frames
 from vnca.painting import Painting
 from vnca.painting import stylize as stylize_volumes
-from vnca.painting.frames import StillSmoke, require_dense
+from vnca.painting.frames import VelocityCheck, require_dense
 from vnca.painting.painter import OnError
 from vnca.recipe import SILENT, Watch, applied, tracked
 from vnca.recipe.film import FilmConfig, Shown
@@ -175,14 +175,14 @@ def _in_memory(
         smoke = with_fitted_scale(options.smoke, sequence)
         region = sequence_region(sequence, smoke, watch)
         require_dense_enough(sequence, smoke, rule.scales.density)
-        still = StillSmoke(rule, smoke, watch.note)
-        count, read = len(sequence), volumes(sequence, smoke, region.lattice, still)
+        check = VelocityCheck(rule, smoke, watch.note)
+        count, read = len(sequence), volumes(sequence, smoke, region.lattice, check)
     else:
         laid, region = region_of(given)
         densities = (volume.density_field.values for volume in laid)
         require_dense(densities, rule.scales.density, "`sequence`")
-        still = StillSmoke(rule, options.smoke, watch.note)
-        count, read = len(laid), still.watched(laid, [None] * len(laid))
+        check = VelocityCheck(rule, options.smoke, watch.note)
+        count, read = len(laid), check.watched(laid, [None] * len(laid))
     rule = placed(rule, region, watch)
     paintings = stylize_volumes(
         read,

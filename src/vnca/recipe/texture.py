@@ -76,6 +76,7 @@ def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | N
         decoder=config.decoder,
         graft=config.graft,
         iterations=iterations,
+        steadiness=config.steadiness,
         features=config.features,
         backend=config.backend,
         seed=config.seed,

@@ -138,6 +138,9 @@ class RuleConfig:
     """Steps of the automaton between two frames; the rule is taught to move at this pace."""
     domain: DomainKind = "active"
     """Which cells are active: those near the smoke, or all of its box as in the paper."""
+    transport: bool = False
+    """Whether the velocity carries the state along between frames. A rule that was taught so keeps
+    patterns as they are; otherwise it is the rule that has to move them, as in the paper."""
     dilation: int = 1
     """Cells are active up to this far from the smoke; beyond is the outside that border cells
     see."""

@@ -31,9 +31,10 @@ from vnca.rule.conditioning import (
     register_conditioning,
 )
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 """The newest that is read. A model is written in the oldest that holds it: 2 with a decoder, 3 if
-it is conditioned on anything else than position, density and velocity."""
+it is conditioned on anything else than position, density and velocity, 4 if its state is carried
+along."""
 MODEL_NAME = "model.safetensors"
 """Name of the model in a run folder."""
 CONFIG_NAME = "config.json"
@@ -180,6 +181,8 @@ def _decoder(tensors: dict[str, NDArray[Any]]) -> Decoder | None:
 
 def _oldest_format(rule: Rule) -> int:
     """The oldest format that holds a rule."""
+    if rule.config.transport:
+        return 4
     if rule.config.conditioning != CONDITIONING:
         return 3
     return 1 if rule.decoder is None else 2

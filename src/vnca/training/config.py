@@ -77,6 +77,9 @@ class TrainingConfig(ABC):
     """Most steps of the automaton in an iteration."""
     overflow: float = 100.0
     """Weight of the penalty on states beyond ±1."""
+    steadiness: float = 0.0
+    """Weight of how much a rollout changes a grown state, relative to the median appearance loss:
+    the rule learns to keep its pattern. 0 leaves it out."""
     features: str = "efficientnet"
     """Network that compares pictures: efficientnet, edges, imagenet, vgg16 (imagenet where it was
     fetched before, else edges), or the path of a VGG's weights."""
@@ -105,8 +108,9 @@ class TrainingConfig(ABC):
                 f"`shortest_rollout` {self.shortest_rollout}: must be from 1 to "
                 f"`longest_rollout` ({self.longest_rollout})"
             )
-        if not 0 <= self.overflow < inf:
-            raise OptionError(f"`overflow` {self.overflow}: must not be negative")
+        for name in ("overflow", "steadiness"):
+            if not 0 <= getattr(self, name) < inf:
+                raise OptionError(f"`{name}` {getattr(self, name)}: must not be negative")
         if not 0 <= self.seed < 2**63:
             raise OptionError(f"`seed` {self.seed}: must be from 0 to 2^63 - 1")
 
@@ -189,6 +193,8 @@ class SmokeConfig(TrainingConfig):
     texture: float = 0.0
     """Iterations on a solid texture of the picture for each one on the smoke, made before those:
     patterns come from there. 0 begins with nothing."""
+    mass: float = 0.0
+    """Weight of the squared change of the whole mass of the smoke by its Δd; 0 leaves it out."""
     augment: bool = False
     """Condition each state of the pool on another speed and density of the smoke, and for every
     other turn the velocity and add one that all cells share: the rule learns from one frame to
@@ -198,6 +204,13 @@ class SmokeConfig(TrainingConfig):
         super().__post_init__()
         if not 0 <= self.texture <= 1000:
             raise OptionError(f"`texture` {self.texture:g}: must be from 0 to 1000")
+        if not 0 <= self.mass < inf:
+            raise OptionError(f"`mass` {self.mass}: must not be negative")
+        if self.rule.transport and self.motion.weight:
+            raise OptionError(
+                f"`motion.weight` {self.motion.weight:g}: the velocity carries the pattern of a "
+                "rule with `transport`, which must not move it as well; leave one of them out"
+            )
 
     @property
     def pictures(self) -> Pictures:

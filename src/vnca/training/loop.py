@@ -24,7 +24,7 @@ from vnca.training.config import TrainingConfig
 from vnca.training.descent import MOST_ROLLBACKS, Descent
 from vnca.training.rollout import Pool, roll_out, states_to_keep
 from vnca.training.scenes import Scene
-from vnca.training.terms import AppearanceTerm, Iteration, OverflowTerm, Term
+from vnca.training.terms import AppearanceTerm, Iteration, OverflowTerm, SteadinessTerm, Term
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,12 @@ class Trainer:
         )
         self._random = np.random.default_rng(config.seed)
         self._generator = torch.Generator().manual_seed(config.seed)
-        own = AppearanceTerm(self._appearance, self._generator), OverflowTerm(config.overflow)
+        own: list[Term] = [
+            AppearanceTerm(self._appearance, self._generator),
+            OverflowTerm(config.overflow),
+        ]
+        if config.steadiness:
+            own.append(SteadinessTerm(config.steadiness))
         self.terms = (*own, *terms)
         self._pool = Pool(scene.seed(config.rule.channels), config.pool, self._random)
         self._descent = self._fresh_descent()
@@ -242,9 +247,11 @@ class Trainer:
 
     def _improve(self) -> Progress:
         config = self.config
-        slot, life, before = self._pool.draw(self.iteration)
+        slot, life, age, before = self._pool.draw(self.iteration)
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
         scene = self.scene.augmented(life)
+        if config.rule.transport and age:
+            before = scene.transported(before, self._random)
         state = self._roll(before, range(self._steps, self._steps + steps), scene)
         self._steps += steps
         viewpoint = scene.viewpoint(self._random)
@@ -253,6 +260,7 @@ class Trainer:
         seen = Iteration(
             before=before,
             after=state,
+            age=age,
             frames=steps / config.rule.steps_per_frame,
             scene=scene,
             viewpoint=viewpoint,

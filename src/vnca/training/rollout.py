@@ -33,11 +33,13 @@ class Drawn(NamedTuple):
     Attributes:
         slot: In the pool.
         life: Number of that which the state leads.
+        age: Rollouts that it has been through since it began with the seed.
         state: `[n + 1, C]`.
     """
 
     slot: int
     life: int
+    age: int
     state: Tensor
 
 
@@ -56,6 +58,7 @@ class Pool:
         self._states: dict[int, Tensor] = {}  # those that are not the seed
         self._lives = list(range(config.size))
         self._begun = config.size
+        self._ages = [0] * config.size
 
     def draw(self, iteration: int) -> Drawn:
         """From a random slot.
@@ -65,7 +68,8 @@ class Pool:
         slot = int(self._random.integers(self._config.size))
         if iteration % self._config.reseed_every == 0:
             self._reseed(slot)
-        return Drawn(slot, self._lives[slot], self._states.get(slot, self._seed))
+        state = self._states.get(slot, self._seed)
+        return Drawn(slot, self._lives[slot], self._ages[slot], state)
 
     def put(self, slot: int, state: Tensor) -> bool:
         """Return a state; False if it had exploded and was replaced by the seed."""
@@ -74,12 +78,14 @@ class Pool:
             self._reseed(slot)
             return False
         self._states[slot] = state
+        self._ages[slot] += 1
         return True
 
     def snapshot(self) -> Snapshot:
         """The states that are not the seed, by slot; not copied, for none is ever changed."""
         states = {str(slot): state for slot, state in self._states.items()}
-        return Snapshot(states, {"lives": [*self._lives], "begun": self._begun})
+        values = {"lives": [*self._lives], "begun": self._begun, "ages": [*self._ages]}
+        return Snapshot(states, values)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Hold the states of a snapshot; which are drawn is up to the random stream.
@@ -95,14 +101,16 @@ class Pool:
                 raise ValueError(f"state {name}: beyond the limit")
         begun = count(snapshot.values["begun"], "lives")
         lives = [count(life, "life", most=begun - 1) for life in snapshot.values["lives"]]
-        if len(lives) != self._config.size:
+        ages = [count(age, "age") for age in snapshot.values["ages"]]
+        if not len(lives) == len(ages) == self._config.size:
             raise ValueError(f"lives: {len(lives)} in a pool of {self._config.size}")
-        self._states, self._lives, self._begun = states, lives, begun
+        self._states, self._lives, self._begun, self._ages = states, lives, begun, ages
 
     def _reseed(self, slot: int) -> None:
         if self._states.pop(slot, None) is not None:
             self._lives[slot] = self._begun
             self._begun += 1
+            self._ages[slot] = 0
 
     def _is_sound(self, state: Tensor) -> bool:
         # A NaN fails the comparison.

@@ -42,6 +42,7 @@ class Iteration:
     Attributes:
         before: The state at the start of the rollout, `[n + 1, C]`.
         after: The state at its end, alike; differentiable.
+        age: Rollouts that the state had been through before.
         frames: Frames that pass in the rollout: its steps over those of a frame.
         scene: That the rollout was in, as it is augmented.
         viewpoint: Where the pictures were taken from.
@@ -54,6 +55,7 @@ class Iteration:
 
     before: Tensor
     after: Tensor
+    age: int
     frames: float
     scene: Scene[Any]
     viewpoint: Any
@@ -127,13 +129,91 @@ class OverflowTerm(Term):
         }
 
 
+GROWN = 2
+"""Rollouts after which a state has grown its pattern, which is then to be kept."""
+_LEAST_VARIANCE = 1e-4
+
+
+class Balance:
+    """The appearance losses of the latest iterations, by whose median other terms are weighted."""
+
+    def __init__(self, over: int) -> None:
+        """Take the median of so many; with none of them it is 1."""
+        self.losses: deque[float] = deque(maxlen=over)
+
+    def after(self, appearance: float) -> float:
+        """The median, with the appearance loss of this iteration."""
+        if math.isfinite(appearance):
+            self.losses.append(appearance)
+        return statistics.median(self.losses) if self.losses else 1.0
+
+    def snapshot(self) -> Snapshot:
+        """The losses."""
+        return Snapshot(values={"appearance": list(self.losses)})
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot.
+
+        Raises:
+            KeyError, TypeError, ValueError: If it is not one of a balance.
+        """
+        losses = [float(loss) for loss in snapshot.values["appearance"]]
+        if not all(map(math.isfinite, losses)):
+            raise ValueError("appearance: not all finite")
+        self.losses = deque(losses, maxlen=self.losses.maxlen)
+
+
+class SteadinessTerm(Term):
+    """How much of a grown state a rollout changes: squared differences over the variance."""
+
+    name = "steadiness"
+
+    def __init__(self, weight: float) -> None:
+        """Weight it relative to the appearance loss."""
+        self._weight = weight
+        self._balance = Balance(25)
+
+    def __call__(self, seen: Iteration) -> dict[str, Tensor]:
+        """Nothing for a state that still grows."""
+        balance = self._balance.after(float(seen.sums["appearance"].detach()))
+        if seen.age < GROWN:
+            return {}
+        before, after = seen.before[:-1], seen.after[:-1]
+        variance = (before - before.mean(0)).square().mean().clamp_min(_LEAST_VARIANCE)
+        change = (after - before).square().mean() / variance
+        return {"steadiness": self._weight * balance * change}
+
+    def snapshot(self) -> Snapshot:
+        """What its weight is balanced by."""
+        return self._balance.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot of such a term."""
+        self._balance.restore(snapshot)
+
+
+class MassTerm(Term):
+    """How much of the smoke appears or disappears."""
+
+    name = "mass"
+
+    def __init__(self, weight: float) -> None:
+        """Weight the square of the change."""
+        self._weight = weight
+
+    def __call__(self, seen: Iteration) -> dict[str, Tensor]:
+        """Of the state at the end of the rollout."""
+        assert isinstance(seen.scene, SmokeScene), "only smoke has a mass"
+        return {"mass": self._weight * seen.scene.mass_change(seen.after).square()}
+
+
 class MotionSupervision(Term):
     """Judges how the pictures before and after a rollout differ.
 
     Attributes:
         name: "motion".
         config: What is compared, and how strongly.
-        appearance: The latest appearance losses, on which the weight of motion is balanced.
+        balance: What its weight is relative to.
     """
 
     name = "motion"
@@ -141,7 +221,7 @@ class MotionSupervision(Term):
     def __init__(self, config: MotionConfig, network: FlowNetwork) -> None:
         """Prepare; `network` is frozen."""
         self.config = config
-        self.appearance: deque[float] = deque(maxlen=config.balance_over)
+        self.balance = Balance(config.balance_over)
         self._network = network
 
     def __call__(self, seen: Iteration) -> dict[str, Tensor]:
@@ -216,25 +296,16 @@ class MotionSupervision(Term):
 
     def weighted(self, motion: Motion, appearance: float) -> Tensor:
         """The motion loss, balanced against the appearance losses of the latest iterations."""
-        if math.isfinite(appearance):
-            self.appearance.append(appearance)
-        balance = statistics.median(self.appearance) if self.appearance else 1.0
+        balance = self.balance.after(appearance)
         return self.config.weight * balance * motion_loss(motion, self.config)
 
     def snapshot(self) -> Snapshot:
         """The losses on which the weight is balanced."""
-        return Snapshot(values={"appearance": list(self.appearance)})
+        return self.balance.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot.
-
-        Raises:
-            KeyError, TypeError, ValueError: If it is not one of motion supervision.
-        """
-        losses = [float(loss) for loss in snapshot.values["appearance"]]
-        if not all(map(math.isfinite, losses)):
-            raise ValueError("appearance: not all finite")
-        self.appearance = deque(losses, maxlen=self.config.balance_over)
+        """Go on from a snapshot of motion supervision."""
+        self.balance.restore(snapshot)
 
 
 def _shrunk(pictures: Tensor, size: int) -> Tensor:

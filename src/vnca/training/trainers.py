@@ -22,7 +22,7 @@ from vnca.training.config import SmokeConfig, TextureConfig, ViewConfig
 from vnca.training.loop import Trainer
 from vnca.training.scenes.smoke import SmokeScene, velocity_scale
 from vnca.training.scenes.texture import BlockScene
-from vnca.training.terms import MotionSupervision, Term
+from vnca.training.terms import MassTerm, MotionSupervision, Term
 
 
 def smoke_trainer(
@@ -58,6 +58,8 @@ def smoke_trainer(
         smoke, rule, config.view, augment=config.augment, device=device, backend=config.backend
     )
     rule = replace(rule, place=Region(Lattice(smoke.index_to_world), scene.domain.box))
+    if config.mass:
+        terms = (MassTerm(config.mass), *terms)
     if config.motion.weight and scene.moves:
         terms = (MotionSupervision(config.motion, FlowNetwork.load(device)), *terms)
     return Trainer(scene, rule, style, config, network, terms=terms, memory_budget=memory_budget)

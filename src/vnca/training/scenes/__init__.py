@@ -103,6 +103,26 @@ class Scene(ABC, Generic[Viewpoint]):
         del number
         return self
 
+    def transported(self, state: Tensor, random: np.random.Generator) -> Tensor:
+        """A state carried along for a random part of a frame; no gradient flows through it.
+
+        So a rule meets what painting makes of its states between frames.
+        """
+        return self._carried(state, random.uniform() * self.drift(random))
+
+    @abstractmethod
+    def drift(self, random: np.random.Generator) -> FloatArray:
+        """By how many cells a frame carries a state, `[n, 3]` or `[3]` the same everywhere."""
+
+    @torch.no_grad()
+    def _carried(self, state: Tensor, moved: FloatArray) -> Tensor:
+        sources = self.domain.sources(self.domain, moved)
+        rows, shares = (torch.from_numpy(part).to(state.device) for part in sources)
+        carried = torch.zeros_like(state)
+        for row, share in zip(rows, shares, strict=True):
+            carried[:-1] += share[:, None] * state[row]
+        return carried
+
     @abstractmethod
     def viewpoint(self, random: np.random.Generator) -> Viewpoint:
         """Where to look from in an iteration, drawn at random."""

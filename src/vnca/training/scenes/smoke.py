@@ -161,6 +161,16 @@ class SmokeScene(Scene[SmokeViewpoint]):
             scene.priors[:, where] = density[:, None]
         return scene
 
+    def drift(self, random: np.random.Generator) -> FloatArray:
+        """The velocity."""
+        del random
+        return self.velocity.cpu().numpy()
+
+    def mass_change(self, state: Tensor) -> Tensor:
+        """By what part of it the state changes the mass of the smoke; differentiable."""
+        factors = self._density_factors(state)
+        return (self._density * factors).sum() / self._density.sum() - 1
+
     def camera(
         self, azimuth: float, elevation: float, *, aspect: float = 1.0
     ) -> Orthographic | Perspective:
@@ -301,11 +311,15 @@ class SmokeScene(Scene[SmokeViewpoint]):
         )
 
     def _painted_density(self, state: Tensor) -> Tensor:
-        """The density on the grid; of a decoded state, what is seen in the middle of cells."""
+        """The density on the grid."""
+        return self.dense(self._density * self._density_factors(state))
+
+    def _density_factors(self, state: Tensor) -> Tensor:
+        """1 + Δd at the cells; of a decoded state, what is seen in their middle."""
         cells = state[:-1]
         if self.decoder is not None:
             cells = self.seen(state, self._centres)
-        return self.dense(self._density * density_factors(cells))
+        return density_factors(cells)
 
 
 def view_width(box: Box, index_to_world: AnyArray) -> float:

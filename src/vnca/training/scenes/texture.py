@@ -197,6 +197,10 @@ class BlockScene(Scene[list[Cut]]):
             return shown(self.dense(colours(state[:-1])), points)
         return colours(self.seen(state, points.view(-1, 3))).view(points.shape)
 
+    def drift(self, random: np.random.Generator) -> FloatArray:
+        """Any way, about a cell and a half: all of the block alike."""
+        return random.standard_normal(3).astype(np.float32)
+
     def viewpoint(self, random: np.random.Generator) -> list[Cut]:
         """Random slices, or views of the mesh."""
         return [self._cut(random) for _ in range(self.slices.count)]

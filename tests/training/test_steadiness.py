@@ -1,0 +1,160 @@
+"""What teaches a rule to keep its pattern where the smoke carries it, and the smoke its mass."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from vnca.core import FloatArray
+from vnca.core.volume import Volume
+from vnca.features.vgg import VGG16
+from vnca.losses import MotionConfig
+from vnca.rule import DENSITY_CHANGE, Decoder, Rule, RuleConfig, Scales
+from vnca.training.config import PoolConfig, SliceConfig, SmokeConfig, ViewConfig
+from vnca.training.loop import Trainer
+from vnca.training.scenes.smoke import SmokeScene
+from vnca.training.scenes.texture import BlockScene
+from vnca.training.terms import GROWN, Iteration, MassTerm, SteadinessTerm
+from vnca.training.trainers import smoke_trainer
+
+SHAPE = RuleConfig(channels=6, hidden=16, transport=True)
+
+
+@pytest.fixture(scope="module")
+def scene(tiny_smoke: Volume) -> SmokeScene:
+    return SmokeScene(tiny_smoke, Rule.initial(SHAPE, Scales(), seed=0), ViewConfig(size=32))
+
+
+@pytest.fixture
+def trainer(tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16) -> Any:
+    def make(**options: Any) -> Trainer:
+        config = replace(
+            tiny_config,
+            rule=replace(tiny_config.rule, transport=True),
+            motion=MotionConfig(weight=0.0),
+            pool=PoolConfig(size=1, reseed_every=100),
+            **options,
+        )
+        return smoke_trainer(tiny_smoke, style, config, vgg)
+
+    return make
+
+
+def grown(scene: SmokeScene) -> torch.Tensor:
+    state = torch.randn(len(scene.domain) + 1, SHAPE.channels, generator=torch.manual_seed(0)) / 4
+    state[-1] = 0
+    return state
+
+
+def iteration(scene: Any, before: torch.Tensor, after: torch.Tensor, age: int) -> Iteration:
+    nothing = torch.zeros(())
+    return Iteration(
+        before=before,
+        after=after,
+        age=age,
+        frames=1.0,
+        scene=scene,
+        viewpoint=None,
+        pictures=nothing,
+        opacity=nothing,
+        background=nothing,
+        sums={"appearance": torch.tensor(3.0)},
+    )
+
+
+def test_what_stays_as_it_is_costs_nothing_and_what_is_all_new_twice_the_weight(
+    scene: SmokeScene,
+) -> None:
+    before = grown(scene)
+    term = SteadinessTerm(0.5)
+    assert float(term(iteration(scene, before, before, GROWN))["steadiness"]) == 0
+    other = before[:-1].flip(0)
+    other = torch.cat([other, before[-1:]])
+    cost = float(term(iteration(scene, before, other, GROWN))["steadiness"])
+    assert cost == pytest.approx(2 * 0.5 * 3.0, rel=0.1)
+
+
+def test_a_state_that_grows_is_left_to_grow(scene: SmokeScene) -> None:
+    before = grown(scene)
+    assert SteadinessTerm(1)(iteration(scene, before, 2 * before, GROWN - 1)) == {}
+
+
+@pytest.mark.parametrize("decoded", [False, True])
+def test_mass_is_that_of_the_density_however_thin_where_it_changes(
+    tiny_smoke: Volume, decoded: bool
+) -> None:
+    decoder = Decoder.initial(SHAPE.channels, seed=0) if decoded else None
+    scene = SmokeScene(
+        tiny_smoke,
+        replace(Rule.initial(SHAPE, Scales(), seed=0), decoder=decoder),
+        ViewConfig(size=32),
+    )
+    state = grown(scene)
+    state[:-1, DENSITY_CHANGE] = 0.2
+    assert float(scene.mass_change(state)) == pytest.approx(0.2, rel=1e-5)
+    cost = MassTerm(50)(iteration(scene, state, state, 0))["mass"]
+    assert float(cost) == pytest.approx(50 * 0.2**2, rel=1e-4)
+    empty = scene._density == 0
+    state[:-1][empty, DENSITY_CHANGE] = -0.4
+    assert float(scene.mass_change(state)) == pytest.approx(0.2, rel=1e-5)
+
+
+def test_smoke_carries_a_state_up_to_a_frame_along(scene: SmokeScene) -> None:
+    height = torch.from_numpy(scene.domain.cells[:, 2].astype(np.float32))
+    state = torch.zeros(len(scene.domain) + 1, SHAPE.channels)
+    state[:-1, 0] = height
+
+    class Whole:
+        def uniform(self) -> float:
+            return 1.0
+
+    carried = scene.transported(state, Whole())  # type: ignore[arg-type]
+    middle = (scene._density > 0.99) & (height > float(height.median()))
+    risen = (height - carried[:-1, 0])[middle]
+    # It rises by half a cell a frame.
+    np.testing.assert_allclose(risen.numpy(), 0.5, atol=0.02)
+    assert not carried[-1].any()
+
+
+def test_a_block_is_carried_as_a_whole() -> None:
+    scene = BlockScene(8, SliceConfig(size=32), conditioning_width=7)
+    state = torch.randn(len(scene.domain) + 1, 4, generator=torch.manual_seed(0))
+    state[-1] = 0
+    carried = scene._carried(state, np.float32([1, 0, -2]))
+    block, moved = (scene.dense(s[:-1]) for s in (state, carried))
+    np.testing.assert_allclose(moved, block.roll((1, -2), (0, 2)), atol=1e-6)
+
+
+def test_a_rule_learns_to_keep_its_pattern(trainer: Callable[..., Trainer]) -> None:
+    def changes(**options: Any) -> float:
+        training = trainer(iterations=40, shortest_rollout=4, longest_rollout=4, **options)
+        term, seen = SteadinessTerm(1), []
+
+        class Watched(SteadinessTerm):
+            def __call__(self, shown: Iteration) -> dict[str, torch.Tensor]:
+                balance = float(shown.sums["appearance"].detach())
+                if told := term(shown):
+                    seen.append(float(told["steadiness"].detach()) / balance)
+                return {}
+
+        watched = Watched(1)
+        watched.name = "watched"
+        training.terms = (*training.terms, watched)
+        list(training.run())
+        return float(np.median(seen[-8:]))
+
+    assert changes(steadiness=4.0) < 0.5 * changes()
+
+
+def test_all_of_it_goes_on_from_a_snapshot(trainer: Callable[..., Trainer]) -> None:
+    options = {"iterations": 8, "steadiness": 2.0, "mass": 10.0}
+    whole, first, second = (trainer(**options) for _ in range(3))
+    list(whole.run())
+    for _ in range(5):
+        first.improve()
+    second.restore(first.snapshot())
+    list(second.run())
+    np.testing.assert_array_equal(whole.rule().hidden, second.rule().hidden)
