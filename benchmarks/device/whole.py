@@ -82,10 +82,19 @@ def train(options: argparse.Namespace) -> None:
 
 
 def compare_losses(options: argparse.Namespace, frame: Path) -> None:
-    """Three iterations on the device and on the CPU; the last has a state whose motion is seen."""
+    """Three iterations on the device and on the CPU; the last has a state whose motion is seen.
+
+    The presets' rules are carried by the smoke: this one is taught to move, as in the paper.
+    """
     volume, style = vnca.read_smoke(frame), read_style(options.picture)
     config = vnca.preset(vnca.SmokeConfig, options.preset)
-    config = replace(config, iterations=3, pool=PoolConfig(size=1, reseed_every=1000))
+    config = replace(
+        config,
+        iterations=3,
+        pool=PoolConfig(size=1, reseed_every=1000),
+        rule=replace(config.rule, transport=False),
+        motion=replace(config.motion, weight=0.3),
+    )
     losses: list[dict[str, float]] = []
     for device in (options.device, "cpu"):
         network = vnca.load_network(config.features, device)

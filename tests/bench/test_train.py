@@ -46,7 +46,7 @@ def test_the_plain_step_trains_as_the_others_do(training: Training) -> None:
 def test_rollouts_begin_from_a_grown_state(training: Training) -> None:
     trainer = training.trainer("reference")
     terms = [trainer.improve().terms for _ in range(train.WARMUP + 10)]
-    assert all("motion" in found for found in terms[train.WARMUP :])  # only what has grown can
+    assert all("steadiness" in found for found in terms[train.WARMUP :])  # only what has grown can
 
 
 def test_nothing_is_timed_when_a_backend_learns_something_else(

@@ -158,7 +158,7 @@ def test_a_preset_of_ones_own_is_a_file_to_copy_and_change(
     mine.write_text(shown.out.replace("milestones = [0.6, 0.85]", "milestones = [0.5]"))
     config = resolved(trained("run", "--preset", mine))
     assert config["config"]["milestones"] == [0.5]
-    assert config["config"]["motion"]["weight"] == 0.3  # as in standard
+    assert config["config"]["steadiness"] == 0.5  # as in standard
     assert config["preset"] == "mine.toml"
 
 

@@ -117,8 +117,15 @@ def run_ablate(arguments: Sequence[str]) -> None:
     """Read the options, train and measure."""
     missing: Any = tyro.MISSING
     name = chosen(arguments, "--preset", DEFAULT)
-    # A texture is left out, as the paper leaves it out.
-    config = dataclasses.replace(preset(SmokeConfig, name), texture=0.0)
+    config = preset(SmokeConfig, name)
+    # As in the paper: no texture first, and the rule has to move its pattern by itself.
+    config = dataclasses.replace(
+        config,
+        texture=0.0,
+        steadiness=0.0,
+        rule=dataclasses.replace(config.rule, transport=False),
+        motion=dataclasses.replace(config.motion, weight=config.motion.weight or 1.0),
+    )
     defaults = Ablate(missing, missing, missing, config=config)
     ablate(parse("ablate", Ablate, arguments, default=defaults))
 

@@ -14,7 +14,7 @@ from vnca.core.volume import Volume
 
 _LEAST_SHARE = 1e-6
 _SAMPLE, _FEWEST_CHANGES = 4000, 64
-_CLEARLY = 0.8
+_FAR_OFF, _CLEARLY = 4, 0.8
 VelocityUnits: TypeAlias = Literal["cells/frame", "m/s", "mantaflow"]
 UNITS: tuple[VelocityUnits, ...] = ("cells/frame", "m/s", "mantaflow")
 # Blender's fluid solver steps in tenths of its unit of time at 25 frames a second.
@@ -226,7 +226,8 @@ def likely_velocity_scale(first: Volume, second: Volume) -> float:
 
     found = {2.0**power: mismatch(2.0**power) for power in range(-7, 8)}
     best = min(found, key=lambda scale: found[scale])
-    return best if found[best] < _CLEARLY * found[1.0] else 1.0
+    is_far_off = not 1 / _FAR_OFF < best < _FAR_OFF
+    return best if is_far_off and found[best] < _CLEARLY * found[1.0] else 1.0
 
 
 def fit_velocity_scale(first: Volume, second: Volume) -> float:
