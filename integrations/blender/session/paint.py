@@ -58,8 +58,8 @@ def main(folder: Path, package: str, style: str) -> None:
     settings.source, settings.style, settings.refine = domain, style, 2
     scene.frame_set(RENDERED[-1])
     bpy.ops.vnca.preview()
-    operators = sys.modules["bl_ext.user_default.vnca.operators"]
-    shutil.copy(operators.current.picture, folder / "preview.png")
+    work = sys.modules["bl_ext.user_default.vnca.work"]
+    shutil.copy(work.current.picture, folder / "preview.png")
     bpy.ops.vnca.paint()
     add_studio(scene)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "painted.blend"))

@@ -41,8 +41,8 @@ def take() -> None:
 
 def save_when_done() -> "float | None":
     """Save the screenshot once the preview is there."""
-    operators = importlib.import_module("extension.operators")
-    if operators.current is not None and operators.current.is_running:
+    work = importlib.import_module("extension.work")
+    if work.current is not None and work.current.is_running:
         return 0.5
     window = bpy.context.window_manager.windows[0]
     for area in window.screen.areas:

@@ -257,7 +257,7 @@ def test_the_preview_is_a_picture_and_changes_nothing(
 ) -> None:
     scene.frame_set(12)
     assert bpy.ops.vnca.preview() == {"FINISHED"}
-    job = import_module(f"{NAME}.operators").current
+    job = import_module(f"{NAME}.work").current
     image = bpy.data.images.load(job.picture)
     assert max(image.size) == 256
     assert np.array(image.pixels[:]).std() > 0.05
@@ -266,11 +266,11 @@ def test_the_preview_is_a_picture_and_changes_nothing(
 
 
 def test_up_is_up(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
-    source = import_module(f"{NAME}.source")
-    assert source.smoke_of(scene, None).up_axis == "z"
+    source = import_module(f"{NAME}.scene.source")
+    assert source.smoke_of(scene, Path()).up_axis == "z"
     plume.rotation_euler.x = np.pi / 2
     bpy.context.view_layer.update()
-    assert source.smoke_of(scene, None).up_axis == "y"
+    assert source.smoke_of(scene, Path()).up_axis == "y"
 
 
 @pytest.mark.skipif(bpy.app.version < (5, 0, 0), reason="Blender 5 brought nodes for grids")
