@@ -101,6 +101,8 @@ def _draw_style(
     else:
         layout.prop(settings, "picture")
         layout.prop(settings, "preset")
+        if settings.preset == "OWN":
+            layout.prop(settings, "preset_file")
         _draw_training(layout, context)
 
 

@@ -10,8 +10,8 @@ from .cache import Placement
 Kind = Literal["paint", "preview", "train", "check"]
 STAGED = "smoke_####.vdb"
 """What frames are called that were copied to be painted; the worker calls them so, too."""
-PICTURES = {"draft": 10, "standard": 25, "paper": 50}
-"""Iterations of a training between two pictures of it, by preset."""
+PICTURES = {"draft": 20}
+"""Iterations of a training between two pictures of it; 50 in other presets."""
 _HASHES = re.compile("#+")
 
 

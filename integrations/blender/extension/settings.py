@@ -91,7 +91,14 @@ class VncaSettings(bpy.types.PropertyGroup):
             ("draft", "Draft", "Minutes"),
             ("standard", "Standard", "About an hour"),
             ("paper", "Paper", "As in the paper; wants a GPU"),
+            ("OWN", "Own", "A preset of your own, as vnca train --show-preset writes one"),
         ],
+    )
+    preset_file: StringProperty(
+        name="Preset",
+        description="A TOML file of hyperparameters",
+        subtype="FILE_PATH",
+        options=_PATH,
     )
     strength: FloatProperty(
         name="Strength",

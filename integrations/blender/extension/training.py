@@ -26,26 +26,7 @@ class VNCA_OT_train(Working):
 
     def start(self, context: bpy.types.Context) -> Job:
         """Train in a folder beside the paintings."""
-        scene, settings = context.scene, context.scene.vnca
-        picture = source.absolute(settings.picture, "the picture")
-        if not picture:
-            raise ProblemError("Choose a picture to learn from")
-        if not Path(picture).is_file():
-            raise ProblemError(f"{picture}: there is no such picture")
-        out = TRAINING.next_version(style_folder_of(scene, picture), goes_on=self.goes_on)
-        if self.goes_on:
-            words, staged = request.resume_words(str(out)), []
-        else:
-            smoke = source.smoke_of(scene, out, masked=False)
-            number = scene.frame_current + source.shift_of(settings.source)
-            number = min(smoke.numbers, key=lambda one: abs(one - number))
-            smoke = smoke.only((number,))
-            staged = [dataclasses.asdict(one) for one in smoke.staged]
-            words = request.train_words(
-                smoke, smoke.file(number), picture, str(out), settings.preset, settings.seed
-            )
-        asked = request.job("train", words, out=str(out), staged=staged)
-        return begin_training(context, asked)
+        return begin_training(context, train_job(context.scene, goes_on=self.goes_on))
 
     def finish(self, scene: bpy.types.Scene, job: Job) -> str:
         """Paint with it from now on."""
@@ -70,6 +51,39 @@ class VNCA_OT_check_training(Working):
         """What it said."""
         told = job.result
         return f"Training works: vnca {told['version']} in Python {told['python']}"
+
+
+def train_job(scene: bpy.types.Scene, *, goes_on: bool = False) -> dict[str, object]:
+    """What the worker is told of a training on the current frame.
+
+    Args:
+        scene: Whose settings say what is learned.
+        goes_on: Whether an interrupted training is gone on with, on what it began with.
+
+    Raises:
+        ProblemError: If something is missing for it.
+    """
+    settings = scene.vnca
+    picture = source.absolute(settings.picture, "the picture")
+    if not picture:
+        raise ProblemError("Choose a picture to learn from")
+    if not Path(picture).is_file():
+        raise ProblemError(f"{picture}: there is no such picture")
+    out = TRAINING.next_version(style_folder_of(scene, picture), goes_on=goes_on)
+    if goes_on:
+        return request.job("train", request.resume_words(str(out)), out=str(out), staged=[])
+    preset = settings.preset
+    if preset == "OWN":
+        preset = source.absolute(settings.preset_file, "the preset")
+        if not Path(preset).is_file():
+            raise ProblemError(f"{preset or 'Own'}: there is no such preset; choose one")
+    smoke = source.smoke_of(scene, out, masked=False)
+    number = scene.frame_current + source.shift_of(settings.source)
+    number = min(smoke.numbers, key=lambda one: abs(one - number))
+    smoke = smoke.only((number,))
+    staged = [dataclasses.asdict(one) for one in smoke.staged]
+    words = request.train_words(smoke, smoke.file(number), picture, str(out), preset, settings.seed)
+    return request.job("train", words, out=str(out), staged=staged)
 
 
 _CLASSES = (VNCA_OT_train, VNCA_OT_check_training)

@@ -202,14 +202,15 @@ def _of_volume(scene: bpy.types.Scene, source: bpy.types.Object) -> Smoke:
     numbers, sequence = (1,), str(path)
     if number is not None:
         numbers = (int(number[1]),)
-    if volume.is_sequence and number is not None:
+    is_sequence = volume.is_sequence and number is not None
+    if is_sequence:
         before, after = path.stem[: number.start()], path.stem[number.end() :]
         digits = len(number[1])
         form = re.compile(re.escape(before) + r"(\d+)" + re.escape(after) + r"\.vdb", re.I)
         found = (form.fullmatch(other.name) for other in path.parent.glob("*"))
         numbers = tuple(sorted(int(match[1]) for match in found if match))
         sequence = str(path.parent / f"{before}{'#' * digits}{after}{path.suffix}")
-    if not (numbers if volume.is_sequence else path.is_file()):
+    if not (numbers if is_sequence else path.is_file()):
         raise ProblemError(f"{path}: there is no such file")
     return Smoke(
         name=source.name,
@@ -219,7 +220,7 @@ def _of_volume(scene: bpy.types.Scene, source: bpy.types.Object) -> Smoke:
         fps=_fps(scene),
         time_scale=scene.vnca.time_scale,
         up_axis=_up_axis(source),
-        is_sequence=volume.is_sequence,
+        is_sequence=is_sequence,
     )
 
 
