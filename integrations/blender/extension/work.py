@@ -22,6 +22,8 @@ from .settings import python_for_training
 WORKER = Path(__file__).parent / "worker"
 TICK = 0.1
 """Seconds between two looks at the work."""
+_PANELS = {("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")}
+"""Where the panel is: areas, and regions of them."""
 
 current: Job | None = None
 """What is at work, or was last."""
@@ -36,6 +38,7 @@ class Working(bpy.types.Operator):
     """What is told when it is cancelled."""
     _timer: bpy.types.Timer | None = None
     _scene = ""
+    _seen: tuple[object, ...] = ()
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -76,7 +79,9 @@ class Working(bpy.types.Operator):
             return {"PASS_THROUGH"}
         is_at_work = job.poll()
         context.window_manager.progress_update(job.fraction)
-        _redraw(context)
+        if (seen := job.seen) != self._seen:
+            self._seen = seen
+            _redraw(context)
         if is_at_work:
             return {"PASS_THROUGH"}
         self._tidy(context)
@@ -173,10 +178,12 @@ def _progress(job: Job) -> str:
 
 
 def _redraw(context: bpy.types.Context) -> None:
+    """Draw the panel anew, and nothing beside it: a view of smoke may take its time."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in {"VIEW_3D", "PROPERTIES"}:
-                area.tag_redraw()
+            for region in area.regions:
+                if (area.type, region.type) in _PANELS:
+                    region.tag_redraw()
 
 
 @persistent
