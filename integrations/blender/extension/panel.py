@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel, in the sidebar of the 3D view and in the data of volumes."""
 
+import textwrap
+
 import bpy
 
 from . import interpreter, thumbnails, work
@@ -9,6 +11,9 @@ from .problem import ProblemError
 from .scene import mixing
 from .settings import domain_of, is_smoke, python_for_training
 from .versions import can_go_on_painting, can_go_on_training
+
+LETTER = 7.0
+"""Width of a letter, pixels of an interface of scale 1."""
 
 
 class _Panel:
@@ -28,7 +33,8 @@ class _Panel:
         _draw_painting(choices, settings)
         _draw_buttons(layout, context, settings, is_at_work=is_at_work)
         if job is not None:
-            _draw_job(layout, job)
+            width = context.region.width / context.preferences.system.ui_scale
+            _draw_job(layout, job, max(int(width / LETTER) - 8, 20))
 
 
 class VNCA_PT_view(_Panel, bpy.types.Panel):
@@ -161,7 +167,14 @@ def _draw_buttons(
         layout.operator("vnca.mix", icon="GEOMETRY_NODES")
 
 
-def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:
+def _draw_lines(layout: bpy.types.UILayout, text: str, icon: str, letters: int) -> None:
+    """A text as long as it is: a label has one line, and leaves out what does not fit."""
+    for line in textwrap.wrap(text, letters):
+        layout.label(text=line, icon=icon)
+        icon = "BLANK1"
+
+
+def _draw_job(layout: bpy.types.UILayout, job: Job, letters: int) -> None:
     box = layout.box()
     if job.is_running:
         text = f"{job.what.capitalize()} {job.done}/{job.total}" if job.total else job.what
@@ -173,14 +186,14 @@ def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:
             box.label(text=f"{text} ({job.fraction:.0%})", icon="TIME")
         box.label(text="Esc cancels")
     elif job.state == "failed":
-        row = box.row()
-        row.alert = True
-        row.label(text=job.message, icon="ERROR")
+        column = box.column(align=True)
+        column.alert = True
+        _draw_lines(column, job.message, "ERROR", letters)
         box.operator("vnca.log", icon="TEXT")
     elif job.state == "cancelled":
         box.label(text="Cancelled; what was finished is kept", icon="CANCEL")
     for note in job.notes[-2:]:
-        box.label(text=note, icon="INFO")
+        _draw_lines(box.column(align=True), note, "INFO", letters)
     if icon := thumbnails.icon_of_work(job.picture):
         box.template_icon(icon, scale=9.0)
 
