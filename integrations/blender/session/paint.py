@@ -26,7 +26,7 @@ def add_studio(scene: bpy.types.Scene) -> None:
     scene.camera = camera
     for lamp in [one for one in scene.objects if one.type == "LIGHT"]:
         bpy.data.objects.remove(lamp)
-    for name, energy, turn in (("Key", 9.0, (50, 0, -55)), ("Rim", 5.0, (60, 0, 140))):
+    for name, energy, turn in (("Key", 5.0, (50, 0, -55)), ("Rim", 2.0, (60, 0, 140))):
         sun = bpy.data.lights.new(name, "SUN")
         sun.energy, sun.angle = energy, 0.2
         lamp = bpy.data.objects.new(name, sun)
