@@ -6,8 +6,8 @@ as a keyboard does, and `import` of ImageMagick. The extension is installed; or 
 folder of its sources, registered by hand where Blender knows no extensions yet. With PICTURE a
 style is trained, too.
 
-FOLDER gets screenshots, and `window.json`: how long it took from Esc to the end of the work, and
-for how long the window was busy at most meanwhile.
+FOLDER gets screenshots, and `window.json`: how long it took from pressing Esc, and from when the
+window heard of it, to the end of the work, and for how long the window was busy at most meanwhile.
 """
 
 import importlib
@@ -24,7 +24,7 @@ import bpy
 
 FOLDER, *REST = sys.argv[sys.argv.index("--") + 1 :]
 INSTALLED = "bl_ext.user_default.vnca"
-MOMENTS = (("", 0.0), ("", 0.3), ("", 1.0), ("{}ing", 0.0), ("{}ing", 3.0))
+MOMENTS = (("", 0.0), ("", 1.0), ("{}ing", 0.0), ("{}ing", 3.0))
 """Seconds after work is what it says, or after its start, at which Esc is pressed."""
 TICK = 0.02
 FRAME = 30
@@ -51,12 +51,8 @@ def steps() -> Iterator[float]:
     press("preview")
     yield from finished(work)
     yield from screenshot("panel.png")
-    settings.refine = 8
-    for what, seconds in MOMENTS:
-        yield from cancelled("paint", what, seconds, work)
-    yield from screenshot("cancelled.png")
     if len(REST) > 1:
-        settings.way, settings.picture, settings.refine = "PICTURE", REST[1], 2
+        settings.way, settings.picture = "PICTURE", REST[1]
         yield from screenshot("picture.png")
         press("train")
         while work.current.is_running and "preview" not in (work.current.picture or ""):
@@ -65,7 +61,10 @@ def steps() -> Iterator[float]:
         yield from esc("train", work)
         for what, seconds in MOMENTS:
             yield from cancelled("train", what, seconds, work)
-        yield from screenshot("trained.png")
+    settings.way, settings.refine = "LIBRARY", 8
+    for what, seconds in MOMENTS:
+        yield from cancelled("paint", what, seconds, work)
+    yield from screenshot("cancelled.png")
     (Path(FOLDER) / "window.json").write_text(json.dumps(told, indent=2) + "\n")
     bpy.ops.wm.quit_blender()
 
@@ -115,7 +114,9 @@ def esc(name: str, work: Any) -> Iterator[float]:
     what = f"{job.what} {job.done}/{job.total}"
     subprocess.Popen(["xdotool", "mousemove", "400", "400", "key", "Escape"])
     start = time.monotonic()
+    heard = 0.0
     while job.is_running and time.monotonic() - start < 30:
+        heard = heard or (time.monotonic() if job.what == "cancelling" else 0.0)
         yield TICK
     told["cancelled"].append(
         {
@@ -123,6 +124,7 @@ def esc(name: str, work: Any) -> Iterator[float]:
             "at": what,
             "state": job.state,
             "seconds": round(time.monotonic() - start, 2),
+            "seconds_since_heard": round(time.monotonic() - (heard or start), 2),
             "longest_busy": round(_busy[1], 2),
         }
     )
