@@ -11,7 +11,7 @@ from .job import Job
 from .problem import ProblemError
 from .scene import source
 from .versions import TRAINING, style_folder_of
-from .work import Working, begin_training
+from .work import Working, begin_training, new_folder
 
 
 class VNCA_OT_train(Working):
@@ -70,8 +70,9 @@ def train_job(scene: bpy.types.Scene, *, goes_on: bool = False) -> dict[str, obj
     if not Path(picture).is_file():
         raise ProblemError(f"{picture}: there is no such picture")
     out = TRAINING.next_version(style_folder_of(scene, picture), goes_on=goes_on)
+    facts = {"out": str(out), "picture": str(new_folder() / "picture.png")}
     if goes_on:
-        return request.job("train", request.resume_words(str(out)), out=str(out), staged=[])
+        return request.job("train", request.resume_words(str(out)), **facts, staged=[])
     preset = settings.preset
     if preset == "OWN":
         preset = source.absolute(settings.preset_file, "the preset")
@@ -83,7 +84,7 @@ def train_job(scene: bpy.types.Scene, *, goes_on: bool = False) -> dict[str, obj
     smoke = smoke.only((number,))
     staged = [dataclasses.asdict(one) for one in smoke.staged]
     words = request.train_words(smoke, smoke.file(number), picture, str(out), preset, settings.seed)
-    return request.job("train", words, out=str(out), staged=staged)
+    return request.job("train", words, **facts, staged=staged)
 
 
 _CLASSES = (VNCA_OT_train, VNCA_OT_check_training)

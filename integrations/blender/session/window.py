@@ -55,7 +55,7 @@ def steps() -> Iterator[float]:
         settings.way, settings.picture = "PICTURE", REST[1]
         yield from screenshot("picture.png")
         press("train")
-        while work.current.is_running and "preview" not in (work.current.picture or ""):
+        while work.current.is_running and not work.current.pictures:
             yield 0.1
         yield from screenshot("training.png")
         yield from esc("train", work)

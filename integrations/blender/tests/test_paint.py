@@ -151,7 +151,7 @@ def test_sliders_change_the_picture_at_once(
     scene.vnca.strength = 0.0
     white = rendered(scene, painted)
     opaque = full[..., 3] > 0.98
-    assert white[..., :3] == pytest.approx(white[..., 3:].repeat(3, -1), abs=1e-3)
+    assert white[..., :3] == pytest.approx(white[..., 3:].repeat(3, -1), abs=0.01)
     scene.vnca.strength = 1.0
     # A ball that holds the left half of the smoke.
     ball = bpy.data.objects.new("Ball", None)
@@ -195,7 +195,7 @@ def test_outside_a_mask_smoke_is_as_dense_as_it_was(
         seen = rendered(scene, painted, shown=0.2)
         opacities.append(seen[..., 3])
         if mask == "BALL":
-            assert seen[..., :3] == pytest.approx(seen[..., 3:].repeat(3, -1), abs=1e-3)
+            assert seen[..., :3] == pytest.approx(seen[..., 3:].repeat(3, -1), abs=0.01)
     before, masked, everywhere = opacities
     assert abs(masked - before).mean() < 0.01
     assert abs(everywhere - before).mean() > 2 * abs(masked - before).mean()
@@ -352,7 +352,7 @@ def test_geometry_nodes_mix_grids(scene: bpy.types.Scene, plume: bpy.types.Objec
     scene.vnca.strength = 0.0
     assert painted.active_material.node_tree.nodes["Strength"].outputs[0].default_value == 1
     white = rendered(scene, painted)
-    assert white[..., :3] == pytest.approx(white[..., 3:].repeat(3, -1), abs=1e-3)
+    assert white[..., :3] == pytest.approx(white[..., 3:].repeat(3, -1), abs=0.01)
     # Half of it is what the material makes of half of it.
     scene.vnca.strength = 0.5
     half = rendered(scene, painted)

@@ -79,7 +79,9 @@ def test_a_picture_becomes_a_style_that_paints(learning: bpy.types.Scene, folder
     assert not (version / "staged").exists()
     # Told while it was at work, and what it looks like in the end.
     assert (work.current.what, work.current.done) == ("training", 2)
-    assert work.current.picture == str(version / "preview_000002.png")
+    shown = bpy.data.images.load(work.current.picture)
+    assert shown.size[0] == pytest.approx(shown.size[1], rel=0.05)
+    assert np.array(shown.pixels[:]).std() > 0.01
     assert any("first, a solid texture" in note for note in work.current.notes)
 
     assert bpy.ops.vnca.paint() == {"FINISHED"}

@@ -115,6 +115,7 @@ def paint(job):
 
 def train(job):
     """Learn a style, and show what vnca shows of it."""
+    import picture
     import staging
 
     from vnca.cli import main
@@ -122,10 +123,16 @@ def train(job):
     run = Path(job["out"])
     folder = run / "staged"
     staging.stage(job["staged"], folder, tell)
+    # Of what was learned before it was gone on with, if it is.
+    shown = latest(run, "**/preview_*.png")
 
     def show():
-        if (path := latest(run, "**/preview_*.png")) is not None:
-            tell("picture", path=str(path))
+        nonlocal shown
+        path = latest(run, "**/preview_*.png")
+        if path is not None and path != shown:
+            shown = path
+            picture.fold(path, job["picture"])
+            tell("picture", path=job["picture"])
 
     sys.stderr = Told(show)
     try:

@@ -65,6 +65,27 @@ def draw(path, out, *, strength, mask):
     os.replace(temporary, out)
 
 
+def fold(sheet, out):
+    """Lay a row of square pictures out as a square of four, which a panel shows larger.
+
+    Args:
+        sheet: The row: the picture that is learned, and views of what was learned of it.
+        out: A PNG file, which appears whole.
+    """
+    with Image.open(sheet) as row:
+        row.load()
+        count, high = round(row.width / row.height), row.height
+        if count >= 4:
+            wide = row.width // count
+            tiles = [row.crop((wide * at, 0, wide * (at + 1), high)) for at in range(4)]
+            row = Image.new("RGB", (2 * wide, 2 * high))
+            for at, tile in enumerate(tiles):
+                row.paste(tile, (wide * (at % 2), high * (at // 2)))
+        temporary = Path(out).with_suffix(".part")
+        row.save(temporary, format="PNG")
+    os.replace(temporary, out)
+
+
 def _shown(file, density, box, strength, mask):
     """Optical depth `[x, y, z]` and colour `[x, y, z, 3]` of cells, z up."""
     extinction = float(file.metadata["vnca_extinction"].value)
