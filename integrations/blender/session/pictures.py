@@ -10,8 +10,8 @@ from pathlib import Path
 from PIL import Image
 
 GAP = 4
-SIDEBAR = (600, 82, 900, 1000)
-"""Where the panel is in a window of 900 columns."""
+SIDEBAR, AT_WORK = (600, 82, 900, 920), (600, 510, 900, 915)
+"""Where the panel is in a window of 900 columns, and in it what is said of the work."""
 
 
 def beside(images: list[Image.Image]) -> Image.Image:
@@ -37,11 +37,13 @@ def main(folder: Path, window: Path, out: Path) -> None:
     lit = [opened(path) for path in sorted(folder.glob("lit_*.png"))]
     preview = opened(folder / "preview.png", lit[0].height)
     beside([*lit, preview]).save(out / "blender_session.webp", quality=88, method=6)
-    panels = [opened(window / name).crop(SIDEBAR) for name in ("panel.png", "picture.png")]
-    beside(panels).save(out / "blender_panel.webp", quality=88, method=6)
-    training = window / "training.png"
-    if training.exists():
-        opened(training).save(out / "blender_training.webp", quality=82, method=6)
+    for name, source, part in (
+        ("blender_panel", "panel.png", SIDEBAR),
+        ("blender_training", "training.png", AT_WORK),
+    ):
+        if (window / source).exists():
+            seen = opened(window / source).crop(part)
+            seen.save(out / f"{name}.webp", quality=88, method=6)
 
 
 main(*map(Path, sys.argv[1:4]))

@@ -44,7 +44,7 @@ def steps() -> Iterator[float]:
     scene = bpy.context.scene
     settings, work = scene.vnca, extension("work")
     settings.source, settings.style, settings.refine = scene.objects["Plume"], "stained_glass", 2
-    settings.folder = str(Path(FOLDER) / "out")
+    settings.folder = "//window"
     scene.frame_set(FRAME)
     show_panel()
     yield 1.0
