@@ -61,6 +61,16 @@ def test_frames_are_found_by_number(parts: Any) -> None:
     assert list(parts.cache.frames(CACHES / "plain", parts.cache.NOISE)) == []
 
 
+def test_what_lies_beside_the_frames_of_a_cache_is_none_of_them(parts: Any, tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    for name in ("fluid_data_0012.vdb", "fluid_data_-003.vdb", "fluid_data_10000.vdb"):
+        (tmp_path / "data" / name).touch()
+    for name in ("fluid_particles_0012.vdb", "fluid_data_0013.uni", ".fluid_data_0014.vdb",
+                 "fluid_data_0015.vdb.part", "fluid_data.vdb"):  # fmt: skip
+        (tmp_path / "data" / name).touch()
+    assert list(parts.cache.frames(tmp_path, parts.cache.DATA)) == [-3, 12, 10000]
+
+
 def test_frames_of_an_adaptive_domain_are_put_in_their_places(staging: Any, tmp_path: Path) -> None:
     told: list[dict[str, Any]] = []
     data = CACHES / "adaptive" / "data" / "fluid_data_0004.vdb"
