@@ -60,7 +60,8 @@ def home_of(name: str, roots: list[Path], ending: str) -> Path | None:
     """The file of a module, compiled or not; None if it is nowhere."""
     for root in roots:
         path = root.joinpath(*name.split("."))
-        compiled = sorted(path.parent.glob(f"{path.name}.*{ending}"))
+        like = sorted(path.parent.glob(f"{path.name}.*"))
+        compiled = [file for file in like if file.name.endswith(ending)]
         for file in (path / "__init__.py", path.with_suffix(".py"), *compiled):
             if file.is_file():
                 return file
