@@ -10,8 +10,8 @@ from pathlib import Path
 from PIL import Image
 
 GAP = 4
-SIDEBAR, AT_WORK = (600, 82, 900, 920), (600, 510, 900, 915)
-"""Where the panel is in a window of 900 columns, and in it what is said of the work."""
+CHOICES, WORK, TRAINING = (600, 82, 900, 512), (600, 570, 900, 1000), (600, 510, 900, 915)
+"""In a window of 900 columns: what is chosen in the panel, and what is said of the work."""
 
 
 def beside(images: list[Image.Image]) -> Image.Image:
@@ -37,13 +37,12 @@ def main(folder: Path, window: Path, out: Path) -> None:
     lit = [opened(path) for path in sorted(folder.glob("lit_*.png"))]
     preview = opened(folder / "preview.png", lit[0].height)
     beside([*lit, preview]).save(out / "blender_session.webp", quality=88, method=6)
-    for name, source, part in (
-        ("blender_panel", "panel.png", SIDEBAR),
-        ("blender_training", "training.png", AT_WORK),
-    ):
-        if (window / source).exists():
-            seen = opened(window / source).crop(part)
-            seen.save(out / f"{name}.webp", quality=88, method=6)
+    panel = opened(window / "panel.png")
+    beside([panel.crop(CHOICES), panel.crop(WORK)]).save(
+        out / "blender_panel.webp", quality=88, method=6
+    )
+    training = opened(window / "training.png").crop(TRAINING)
+    training.save(out / "blender_training.webp", quality=88, method=6)
 
 
 main(*map(Path, sys.argv[1:4]))
