@@ -36,11 +36,11 @@ paper: setup
 # Zips of the extension with their index, in build/blender/repository, and its tests in Blender:
 # the package bpy, which needs Python 3.11 and a few of X11's libraries.
 BLENDER_PYTHON ?= python3.11
-BPY := 4.5.15
-BLENDER := build/blender/venv/bin/python
+BPY ?= 4.5.15
+BLENDER := build/blender/bpy-$(BPY)/bin/python
 blender: setup
 	test -e build/blender/.ready-$(BPY) || { \
-	  $(BLENDER_PYTHON) -m venv build/blender/venv && \
+	  $(BLENDER_PYTHON) -m venv build/blender/bpy-$(BPY) && \
 	  $(BIN)/uv pip install --quiet --python $(BLENDER) bpy==$(BPY) 'numpy<2' pytest && \
 	  touch build/blender/.ready-$(BPY); }
 	$(BIN)/python integrations/blender/build.py --blender $(BLENDER) --out build/blender/repository

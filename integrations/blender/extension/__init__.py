@@ -5,7 +5,7 @@ The work is done by vnca in a process of its own (`worker/`); `job` follows it. 
 of Blender (`cache`, `interpreter`, `job`, `request`, `styles`) imports no `bpy`.
 """
 
-_PARTS = ("thumbnails", "settings", "operators", "mixing", "panel")
+_PARTS = ("thumbnails", "settings", "work", "operators", "training", "scene.mixing", "panel")
 
 
 def register() -> None:

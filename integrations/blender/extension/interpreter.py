@@ -14,6 +14,12 @@ HOW_TO_TRAIN = (
     "Make a Python environment with vnca in it, pip install 'vnca[train]', and name its folder in "
     "Preferences > Add-ons > vnca. Painting with the styles of the library needs none."
 )
+NO_TRAINING = (
+    "Training needs a Python environment with vnca[train],",
+    "which the preferences name. Styles of the library",
+    "and models paint without it.",
+)
+"""What the panel says where there is none, a line each."""
 _PROGRAMS = ("bin/python3", "bin/python", "Scripts/python.exe", "python.exe", "python3", "python")
 
 

@@ -26,6 +26,7 @@ class Job:
         total: How many there are; 0 while that is not known.
         seconds_left: None while that is not known.
         picture: The latest picture of the work, if there is one.
+        pictures: How many there were.
         notes: What was worth telling.
         message: Why it failed, a line.
         result: What it told at the end.
@@ -45,6 +46,7 @@ class Job:
         self.what, self.done, self.total = "starting", 0, 0
         self.seconds_left: float | None = None
         self.picture: str | None = None
+        self.pictures = 0
         self.notes: list[str] = []
         self.result: dict[str, Any] = {}
         folder.mkdir(parents=True, exist_ok=True)
@@ -76,6 +78,12 @@ class Job:
     def fraction(self) -> float:
         """How far the work has come, from 0 to 1."""
         return min(self.done / self.total, 1.0) if self.total else 0.0
+
+    @property
+    def seen(self) -> tuple[object, ...]:
+        """What is shown of it: equal as long as nothing new is to be seen."""
+        left = None if self.seconds_left is None else round(self.seconds_left)
+        return self.state, self.what, self.done, self.total, left, self.pictures, len(self.notes)
 
     def poll(self) -> bool:
         """Read what it said since, without waiting; whether it is at work still."""
@@ -139,6 +147,7 @@ class Job:
             self.notes.append(str(told.get("text", "")))
         elif kind == "picture":
             self.picture = told["path"]
+            self.pictures += 1
         elif kind == "error":
             self.message = str(told.get("message", ""))
         elif kind == "finished":

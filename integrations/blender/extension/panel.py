@@ -1,11 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel, in the sidebar of the 3D view and in the data of volumes."""
 
+import textwrap
+
 import bpy
 
-from . import mixing, operators, thumbnails
-from .job import clock
-from .settings import domain_of, is_smoke
+from . import interpreter, thumbnails, work
+from .job import Job, clock
+from .problem import ProblemError
+from .scene import mixing
+from .settings import domain_of, is_smoke, python_for_training
+from .versions import can_go_on_painting, can_go_on_training
+
+LETTER = 7.0
+"""Width of a letter, pixels of an interface of scale 1."""
 
 
 class _Panel:
@@ -16,16 +24,17 @@ class _Panel:
         layout, settings = self.layout, context.scene.vnca
         layout.use_property_split = True
         layout.use_property_decorate = False
-        job = operators.current
+        job = work.current
         is_at_work = job is not None and job.is_running
         choices = layout.column()
         choices.enabled = not is_at_work
         _draw_smoke(choices, context, settings)
-        _draw_style(choices, settings)
+        _draw_style(choices, context, settings)
         _draw_painting(choices, settings)
         _draw_buttons(layout, context, settings, is_at_work=is_at_work)
         if job is not None:
-            _draw_job(layout, job)
+            width = context.region.width / context.preferences.system.ui_scale
+            _draw_job(layout, job, max(int(width / LETTER) - 8, 20))
 
 
 class VNCA_PT_view(_Panel, bpy.types.Panel):
@@ -85,7 +94,9 @@ def _draw_smoke(
     layout.label(text=fps, icon="TIME")
 
 
-def _draw_style(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+def _draw_style(
+    layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup
+) -> None:
     layout.separator()
     layout.row().prop(settings, "way", expand=True)
     if settings.way == "LIBRARY":
@@ -96,7 +107,25 @@ def _draw_style(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
     else:
         layout.prop(settings, "picture")
         layout.prop(settings, "preset")
-        layout.operator("vnca.train", icon="OUTLINER_OB_LIGHTPROBE")
+        if settings.preset == "OWN":
+            layout.prop(settings, "preset_file")
+        _draw_training(layout, context)
+
+
+def _draw_training(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    try:
+        words = interpreter.trainer(python_for_training(context), work.WORKER).words
+    except ProblemError:
+        box = layout.box()
+        for line in interpreter.NO_TRAINING:
+            box.label(text=line)
+        box.operator("preferences.addon_show", text="Preferences").module = __package__
+        return
+    row = layout.row(align=True)
+    row.operator("vnca.train", icon="OUTLINER_OB_LIGHTPROBE")
+    if can_go_on_training(context.scene):
+        row.operator("vnca.train", text="Go On", icon="PLAY").goes_on = True
+    layout.label(text=f"with {words[0]}", icon="CONSOLE")
 
 
 def _draw_painting(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -104,7 +133,7 @@ def _draw_painting(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
     for name in ("strength", "glow", "density_strength", "refine", "seed"):
         layout.prop(settings, name)
     layout.prop(settings, "mask")
-    if settings.mask in ("BOX", "BALL"):
+    if settings.mask in ("BOX", "BALL", "MESH"):
         layout.prop(settings, "mask_object")
     elif settings.mask == "GRID":
         layout.prop(settings, "mask_grid")
@@ -132,13 +161,20 @@ def _draw_buttons(
     row = layout.row(align=True)
     row.scale_y = 1.5
     row.operator("vnca.paint", icon="BRUSH_DATA")
-    if operators.can_go_on(context.scene):
+    if can_go_on_painting(context.scene):
         row.operator("vnca.paint", text="Go On", icon="PLAY").goes_on = True
     if settings.result is not None and mixing.is_possible():
         layout.operator("vnca.mix", icon="GEOMETRY_NODES")
 
 
-def _draw_job(layout: bpy.types.UILayout, job: operators.Job) -> None:
+def _draw_lines(layout: bpy.types.UILayout, text: str, icon: str, letters: int) -> None:
+    """A text as long as it is: a label has one line, and leaves out what does not fit."""
+    for line in textwrap.wrap(text, letters):
+        layout.label(text=line, icon=icon)
+        icon = "BLANK1"
+
+
+def _draw_job(layout: bpy.types.UILayout, job: Job, letters: int) -> None:
     box = layout.box()
     if job.is_running:
         text = f"{job.what.capitalize()} {job.done}/{job.total}" if job.total else job.what
@@ -150,14 +186,14 @@ def _draw_job(layout: bpy.types.UILayout, job: operators.Job) -> None:
             box.label(text=f"{text} ({job.fraction:.0%})", icon="TIME")
         box.label(text="Esc cancels")
     elif job.state == "failed":
-        row = box.row()
-        row.alert = True
-        row.label(text=job.message, icon="ERROR")
+        column = box.column(align=True)
+        column.alert = True
+        _draw_lines(column, job.message, "ERROR", letters)
         box.operator("vnca.log", icon="TEXT")
     elif job.state == "cancelled":
         box.label(text="Cancelled; what was finished is kept", icon="CANCEL")
     for note in job.notes[-2:]:
-        box.label(text=note, icon="INFO")
+        _draw_lines(box.column(align=True), note, "INFO", letters)
     if icon := thumbnails.icon_of_work(job.picture):
         box.template_icon(icon, scale=9.0)
 

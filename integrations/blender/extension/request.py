@@ -1,33 +1,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist asks for, and the words in which vnca is told of it."""
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from .cache import Placement
 
 Kind = Literal["paint", "preview", "train", "check"]
+STAGED = "smoke_####.vdb"
+"""What frames are called that were copied to be painted; the worker calls them so, too."""
+PICTURES = {"draft": 20}
+"""Iterations of a training between two pictures of it; 50 in other presets."""
+_HASHES = re.compile("#+")
 
 
 @dataclass(frozen=True)
 class Staged:
-    """A frame of a cache whose cells have to be put in their places before it is painted.
+    """A frame that is copied before it is painted, with its cells in their places.
 
     Attributes:
         number: Of the frame.
         data: File of the simulation.
         noise: File of its noise, with the finer density; None without.
-        first: Cell of the whole domain that is cell (0, 0, 0) of the file of the simulation.
+        first: Cell of the whole domain that is cell (0, 0, 0) of the file of the simulation; None
+            where the cells lie where they should already.
         voxel: Length of its cells.
         finer: Cells of the noise along an edge of one of the simulation.
+        keeps: Whether its density is kept beside the painted one, to be seen outside a mask.
     """
 
     number: int
     data: str
-    noise: str | None
-    first: tuple[int, int, int]
-    voxel: float
-    finer: int
+    noise: str | None = None
+    first: tuple[int, int, int] | None = None
+    voxel: float = 1.0
+    finer: int = 1
+    keeps: bool = False
 
 
 @dataclass(frozen=True)
@@ -44,8 +53,8 @@ class Smoke:
         time_scale: Of the simulation.
         up_axis: Which axis of the files points up.
         placement: From the files' world to the object; None if they are the same.
-        staged: What to stage, if cells are not where they belong.
-        is_sequence: Whether there is a number in the names of the files.
+        staged: What to copy, if cells are not where they belong or a mask needs more grids.
+        is_sequence: Whether `sequence` has `#` for the number of a frame.
     """
 
     name: str
@@ -58,6 +67,30 @@ class Smoke:
     placement: Placement | None = None
     staged: tuple[Staged, ...] = ()
     is_sequence: bool = True
+
+    def only(self, numbers: tuple[int, ...]) -> "Smoke":
+        """Some of its frames."""
+        staged = tuple(one for one in self.staged if one.number in numbers)
+        return replace(self, numbers=numbers, staged=staged)
+
+    def file(self, number: int) -> str:
+        """The file of a frame."""
+        if not self.is_sequence:
+            return self.sequence
+        (*_, last) = _HASHES.finditer(self.sequence)
+        return (
+            f"{self.sequence[: last.start()]}{number:0{len(last[0])}d}{self.sequence[last.end() :]}"
+        )
+
+    def masked(self, folder: str) -> "Smoke":
+        """The same, copied into a folder with what a mask needs."""
+        staged = self.staged or tuple(Staged(n, self.file(n)) for n in self.numbers)
+        sequence = f"{folder}/{STAGED}"
+        if not self.is_sequence:
+            sequence = staged_file(folder, self.numbers[0])
+        return replace(
+            self, sequence=sequence, staged=tuple(replace(one, keeps=True) for one in staged)
+        )
 
 
 @dataclass(frozen=True)
@@ -125,9 +158,20 @@ def train_words(
     """
     return [
         *("train", frame, picture, "--out", out, "--preset", preset, "--seed", str(seed)),
+        *("--preview-every", str(PICTURES.get(preset, 50))),
         *smoke_words(smoke),
         *("--overwrite", "--json-progress"),
     ]
+
+
+def resume_words(out: str) -> list[str]:
+    """Go on with the training in a folder, on what it began with."""
+    return ["train", "--resume", out, "--json-progress"]
+
+
+def staged_file(folder: str, number: int) -> str:
+    """The file of a frame that was copied to be painted."""
+    return f"{folder}/{STAGED.replace('####', f'{number:04d}')}"
 
 
 def numbers_text(numbers: tuple[int, ...]) -> str:

@@ -11,7 +11,11 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import mixing, thumbnails
+from . import thumbnails
+from .scene import mixing
+
+# Before 4.5 every path may be relative to the scene, and nothing says so.
+_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 
 
 def is_smoke(_: object, candidate: bpy.types.Object) -> bool:
@@ -70,10 +74,16 @@ class VncaSettings(bpy.types.PropertyGroup):
     )
     style: EnumProperty(name="Style", items=thumbnails.style_items)
     model: StringProperty(
-        name="Model", description="A model file, or the folder of a training", subtype="FILE_PATH"
+        name="Model",
+        description="A model file, or the folder of a training",
+        subtype="FILE_PATH",
+        options=_PATH,
     )
     picture: StringProperty(
-        name="Picture", description="The picture to learn from", subtype="FILE_PATH"
+        name="Picture",
+        description="The picture to learn from",
+        subtype="FILE_PATH",
+        options=_PATH,
     )
     preset: EnumProperty(
         name="Training",
@@ -81,7 +91,14 @@ class VncaSettings(bpy.types.PropertyGroup):
             ("draft", "Draft", "Minutes"),
             ("standard", "Standard", "About an hour"),
             ("paper", "Paper", "As in the paper; wants a GPU"),
+            ("OWN", "Own", "A preset of your own, as vnca train --show-preset writes one"),
         ],
+    )
+    preset_file: StringProperty(
+        name="Preset",
+        description="A TOML file of hyperparameters",
+        subtype="FILE_PATH",
+        options=_PATH,
     )
     strength: FloatProperty(
         name="Strength",
@@ -129,12 +146,14 @@ class VncaSettings(bpy.types.PropertyGroup):
     last: IntProperty(name="Last", default=24)
     mask: EnumProperty(
         name="Mask",
-        description="Where colours are painted; elsewhere smoke is white",
+        description="Where smoke is painted; elsewhere it is white, and as dense as it was. "
+        "Colours follow at once, densities from the next painting on",
         items=[
-            ("NONE", "Everywhere", ""),
+            ("NONE", "Everywhere", "All smoke is painted"),
             ("BOX", "Box of Object", "Inside the cube of an empty, or of any object"),
             ("BALL", "Ball of Object", "Inside the unit ball of an object"),
-            ("GRID", "Grid", "By a grid of the files, such as flame"),
+            ("MESH", "Inside of Mesh", "Inside a closed mesh as it is when Paint is pressed"),
+            ("GRID", "Grid", "By a grid of the files, such as flame, from 0 to 1"),
         ],
         update=_shown_at_once,
     )
@@ -145,6 +164,7 @@ class VncaSettings(bpy.types.PropertyGroup):
         description="Folder for the painted files; // is where the scene is saved",
         default="//vnca",
         subtype="DIR_PATH",
+        options=_PATH,
     )
     hide_source: BoolProperty(
         name="In Place of the Smoke",

@@ -14,19 +14,21 @@ os.environ["BLENDER_USER_RESOURCES"] = _PROFILE  # before bpy is imported
 import bpy
 
 RENDERED = (16, 26, 36)
-SIZE = 240, 360
+SIZE = 280, 400
+_LAMPS = (("Key", 8.0, (55, 0, -50)), ("Fill", 2.5, (70, 0, 35)), ("Rim", 3.0, (60, 0, 140)))
+"""Suns: what they are called, how strong they are, and how they are turned, degrees."""
 
 
 def add_studio(scene: bpy.types.Scene) -> None:
-    """A camera, a key light from the left, and a soft dark world."""
+    """A camera, lamps, and a dark world."""
     camera = bpy.data.objects.new("View", bpy.data.cameras.new("View"))
-    camera.location, camera.rotation_euler = (0, -6.6, 1.7), (radians(88), 0, 0)
-    camera.data.lens = 62
+    camera.location, camera.rotation_euler = (0, -6.6, 1.35), (radians(90), 0, 0)
+    camera.data.lens = 80
     scene.collection.objects.link(camera)
     scene.camera = camera
     for lamp in [one for one in scene.objects if one.type == "LIGHT"]:
         bpy.data.objects.remove(lamp)
-    for name, energy, turn in (("Key", 9.0, (50, 0, -55)), ("Rim", 5.0, (60, 0, 140))):
+    for name, energy, turn in _LAMPS:
         sun = bpy.data.lights.new(name, "SUN")
         sun.energy, sun.angle = energy, 0.2
         lamp = bpy.data.objects.new(name, sun)
@@ -37,7 +39,7 @@ def add_studio(scene: bpy.types.Scene) -> None:
     if world.node_tree is None:
         world.use_nodes = True
     background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (0.02, 0.022, 0.03, 1)
+    background.inputs["Color"].default_value = (0.004, 0.0045, 0.006, 1)
     background.inputs["Strength"].default_value = 1.0
 
 
@@ -58,8 +60,8 @@ def main(folder: Path, package: str, style: str) -> None:
     settings.source, settings.style, settings.refine = domain, style, 2
     scene.frame_set(RENDERED[-1])
     bpy.ops.vnca.preview()
-    operators = sys.modules["bl_ext.user_default.vnca.operators"]
-    shutil.copy(operators.current.picture, folder / "preview.png")
+    work = sys.modules["bl_ext.user_default.vnca.work"]
+    shutil.copy(work.current.picture, folder / "preview.png")
     bpy.ops.vnca.paint()
     add_studio(scene)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "painted.blend"))
@@ -79,7 +81,7 @@ try:
     main(
         Path(sys.argv[1]).absolute(),
         str(Path(sys.argv[2]).absolute()),
-        (sys.argv[3:] or ["stained_glass"])[0],
+        (sys.argv[3:] or ["cafe"])[0],
     )
 finally:
     shutil.rmtree(_PROFILE, ignore_errors=True)

@@ -25,14 +25,15 @@ def said(operator: Any, **options: object) -> str:
 
 def begin(scene: bpy.types.Scene) -> Any:
     """Painting at work, as a button begins it; a window's timer would call `poll`."""
-    operators = import_module(f"{NAME}.operators")
-    out = operators.version_to_paint(operators.folder_of(scene), goes_on=False)
-    smoke = operators.source.smoke_of(scene, out)
-    look = operators.source.look_of(scene.vnca)
-    words = operators.request.paint_words(smoke, look, str(out), "6-7")
-    asked = operators._paint_job("paint", smoke, words, out)
-    operators.current = operators._start(bpy.context, asked, look)
-    return operators.current
+    operators, work, source, versions = (
+        import_module(f"{NAME}.{name}")
+        for name in ("operators", "work", "scene.source", "versions")
+    )
+    out = versions.PAINTING.next_version(versions.folder_of(scene), goes_on=False)
+    smoke = source.smoke_of(scene, out)
+    look = source.look_of(scene.vnca)
+    work.current = work.begin_painting(operators.paint_job(scene, "paint", smoke, look, out))
+    return work.current
 
 
 def until(job: Any, what: str, seconds: float = 60, *, least: int = 0) -> None:
@@ -68,7 +69,7 @@ def test_cancelling_takes_less_than_a_second_at_any_moment(
 def test_a_cancelled_painting_is_gone_on_with(
     scene: bpy.types.Scene, plume: bpy.types.Object, folder: Path
 ) -> None:
-    operators = import_module(f"{NAME}.operators")
+    versions = import_module(f"{NAME}.versions")
     scene.vnca.refine = 5
     job = begin(scene)
     until(job, "painting")
@@ -76,9 +77,9 @@ def test_a_cancelled_painting_is_gone_on_with(
     while job.poll():
         time.sleep(0.02)
     (version,) = (folder / "out" / "Plume embers").iterdir()
-    assert operators.can_go_on(scene)
+    assert versions.can_go_on_painting(scene)
     assert bpy.ops.vnca.paint(goes_on=True) == {"FINISHED"}
-    assert not operators.can_go_on(scene)
+    assert not versions.can_go_on_painting(scene)
     assert [path.name for path in sorted((version / "painted").iterdir())] == [
         "plume_0006.vdb",
         "plume_0007.vdb",

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from vnca.cli import main
+from vnca.core import Box
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 from vnca.rule.model import style_names
 
@@ -33,7 +34,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 def staging(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     monkeypatch.syspath_prepend(str(ROOT / "extension" / "worker"))
     yield importlib.import_module("staging")
-    del sys.modules["staging"]
+    del sys.modules["staging"], sys.modules["inside"]
 
 
 def test_the_simulator_tells_where_cells_are(parts: Any) -> None:
@@ -60,12 +61,22 @@ def test_frames_are_found_by_number(parts: Any) -> None:
     assert list(parts.cache.frames(CACHES / "plain", parts.cache.NOISE)) == []
 
 
+def test_what_lies_beside_the_frames_of_a_cache_is_none_of_them(parts: Any, tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    for name in ("fluid_data_0012.vdb", "fluid_data_-003.vdb", "fluid_data_10000.vdb"):
+        (tmp_path / "data" / name).touch()
+    for name in ("fluid_particles_0012.vdb", "fluid_data_0013.uni", ".fluid_data_0014.vdb",
+                 "fluid_data_0015.vdb.part", "fluid_data.vdb"):  # fmt: skip
+        (tmp_path / "data" / name).touch()
+    assert list(parts.cache.frames(tmp_path, parts.cache.DATA)) == [-3, 12, 10000]
+
+
 def test_frames_of_an_adaptive_domain_are_put_in_their_places(staging: Any, tmp_path: Path) -> None:
     told: list[dict[str, Any]] = []
     data = CACHES / "adaptive" / "data" / "fluid_data_0004.vdb"
     frame = {
         "number": 4, "data": str(data), "noise": None, "first": (4, 0, 0), "voxel": 3 / 32,
-        "finer": 1,
+        "finer": 1, "keeps": False,
     }  # fmt: skip
     staging.stage([frame], tmp_path / "staged", lambda kind, **facts: told.append(facts))
     with open_vdb(tmp_path / "staged" / "smoke_0004.vdb") as ours, open_vdb(data) as theirs:
@@ -88,7 +99,7 @@ def test_noise_lies_in_the_cells_of_its_simulation(staging: Any, tmp_path: Path)
         write_vdb(tmp_path / f"{name}.vdb", [grid])
     frame = {
         "number": 1, "data": str(tmp_path / "density.vdb"), "first": (1, 0, 0), "voxel": 0.5,
-        "noise": str(tmp_path / "density_noise.vdb"), "finer": 4,
+        "noise": str(tmp_path / "density_noise.vdb"), "finer": 4, "keeps": False,
     }  # fmt: skip
     staging.stage([frame], tmp_path / "staged", lambda *_, **__: None)
     with open_vdb(tmp_path / "staged" / "smoke_0001.vdb") as file:
@@ -96,6 +107,78 @@ def test_noise_lies_in_the_cells_of_its_simulation(staging: Any, tmp_path: Path)
         matrix = file.grids["density"].transform.index_to_world
     # Cell 0 is an eighth of 0.5 behind the lower face of cell 1, which is at 0.25.
     assert matrix[:3, 3] == pytest.approx((0.25 + 0.0625, -0.25 + 0.0625, -0.25 + 0.0625))
+
+
+def ball(radius: float, rings: int = 12) -> np.ndarray:
+    """Triangles `[n, 3, 3]` of a closed ball around the origin."""
+    turn, tilt = np.meshgrid(
+        np.linspace(0, 2 * np.pi, 2 * rings + 1), np.linspace(0, np.pi, rings + 1), indexing="ij"
+    )
+    at = np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], -1)
+    at[-1], at = at[0], radius * at
+    a, b, c, d = at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]
+    return np.concatenate([np.stack(t, -2).reshape(-1, 3, 3) for t in ((a, b, c), (a, c, d))])
+
+
+def test_cells_inside_a_mesh_are_those_whose_middle_is(staging: Any) -> None:
+    inside = sys.modules["inside"]
+    matrix = Transform.uniform(0.1, (0.03, -0.02, 0.01)).index_to_world
+    box = Box((-12, -12, -12), (12, 12, 12))
+    middles = (np.stack(np.indices(box.shape), -1) - 12) * 0.1 + (0.03, -0.02, 0.01)
+    far = np.linalg.norm(middles, axis=-1)
+    mesh = np.concatenate([ball(0.9, 40), ball(0.4, 40)])  # a shell
+    found = inside.cells(mesh, box, matrix)
+    clear = (abs(far - 0.9) > 0.01) & (abs(far - 0.4) > 0.01)
+    np.testing.assert_array_equal(found[clear], ((far < 0.9) & (far > 0.4))[clear])
+    # Edges and corners right on the lines upwards through the middles of cells.
+    corners = np.array([[x, y, z] for x in (-5, 5) for y in (-5, 5) for z in (-5, 5)], float)
+    faces = [
+        (0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 4, 5), (0, 5, 1),
+        (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
+    ]  # fmt: skip
+    cube = inside.cells(corners[np.array(faces)], box, np.eye(4))
+    assert cube.sum() in range(9**3, 11**3 + 1)
+    assert cube[8:17, 8:17, 8:17].all()
+    # A mesh that reaches beyond the box on every side.
+    assert inside.cells(100 * corners[np.array(faces)], box, np.eye(4)).all()
+
+
+def test_masked_frames_keep_their_density_and_know_the_mesh(staging: Any, tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    cells = rng.random((8, 8, 8), np.float32)
+    density, other = (
+        Grid.from_dense(name, cells, cells > 0, (-4, -4, -4), transform=Transform.uniform(1))
+        for name in ("density", "flame")
+    )
+    source = tmp_path / "own_0007.vdb"
+    write_vdb(source, [density, other], metadata={"creator": "a program"})
+    np.save(tmp_path / "mesh.npy", ball(3.2))
+    frame = {"number": 7, "data": str(source), "noise": None, "first": None, "keeps": True}
+    told: list[object] = []
+    for _ in range(2):
+        staging.stage(
+            [frame], tmp_path, lambda *a, **_: told.append(a), mesh=str(tmp_path / "mesh.npy")
+        )
+    staged = tmp_path / "smoke_0007.vdb"
+    with open_vdb(staged) as file, open_vdb(source) as before:
+        assert set(file.grids) == {"density", "flame", "unpainted", "vnca_mask"}
+        assert file.metadata["creator"] == before.metadata["creator"]
+        box = before.read("density").active_box()
+        for name in ("density", "unpainted"):
+            np.testing.assert_array_equal(file.read(name).to_dense(box)[0], cells)
+        mask = file.read("vnca_mask").to_dense(box)[0]
+    assert mask[4, 4, 4] == 1
+    assert mask[0, 0, 0] == 0
+    # Copied again once the smoke is newer.
+    written = staged.stat().st_mtime_ns
+    write_vdb(source, [other, density])
+    staging.stage([frame], tmp_path, lambda *_, **__: None)
+    assert staged.stat().st_mtime_ns > written
+    # A frame without smoke has nothing to keep.
+    write_vdb(source, [])
+    staging.stage([frame], tmp_path, lambda *_, **__: None, mesh=str(tmp_path / "mesh.npy"))
+    with open_vdb(staged) as file:
+        assert not file.grids
 
 
 def test_the_words_are_ones_that_vnca_takes(parts: Any, tmp_path: Path) -> None:
@@ -115,6 +198,21 @@ def test_the_words_are_ones_that_vnca_takes(parts: Any, tmp_path: Path) -> None:
     frame = str(tmp_path / "gone.vdb")
     trained = request.train_words(smoke, frame, "gone.png", str(tmp_path / "run"), "draft", 3)
     assert main(trained) == 2
+    assert main(request.resume_words(str(tmp_path / "run"))) == 2
+
+
+def test_a_frame_is_named_as_its_sequence_is(parts: Any) -> None:
+    smoke = parts.request.Smoke("Plume", "a#/p.##.vdb", (7,), "m/s", 24.0)
+    assert smoke.file(7) == "a#/p.07.vdb"
+    assert parts.request.Smoke("P", "a#/p_#.vdb", (12,), "m/s", 24.0).file(12) == "a#/p_12.vdb"
+    single = parts.request.Smoke("P", "p_7.vdb", (7,), "m/s", 24.0, is_sequence=False)
+    assert single.file(7) == "p_7.vdb"
+    masked = single.masked("out/staged")
+    assert masked.sequence == masked.file(7) == "out/staged/smoke_0007.vdb"
+    assert masked.staged == (parts.request.Staged(7, "p_7.vdb", keeps=True),)
+    masked = smoke.masked("out/staged")
+    assert masked.file(7) == "out/staged/smoke_0007.vdb"
+    assert masked.staged[0].data == "a#/p.07.vdb"
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import importlib
 import json
 import sys
+import time
 import types
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +21,7 @@ from vnca.io.vdb import open_vdb, write_vdb
 from vnca.rule.model import style_names
 
 ROOT = Path(__file__).parents[3] / "integrations" / "houdini"
-NAMES = ("request", "work", "node", "farm")
+NAMES = ("request", "work", "node", "farm", "asset")
 
 
 class Modules(types.SimpleNamespace):
@@ -30,6 +31,7 @@ class Modules(types.SimpleNamespace):
     work: Any
     node: Any
     farm: Any
+    asset: Any
     hou: Any
 
 
@@ -140,7 +142,8 @@ def test_work_is_followed_and_its_error_is_the_message(package: Modules, tmp_pat
     words = script(tmp_path / "works.py", lines + "\nprint('no JSON', file=sys.stderr)")
     notes = package.work.run(sys.executable, words, lambda *facts: told.append(facts))
     assert notes == ["a note"]
-    assert told == [(0.5, "painting 1 of 2 frames")]
+    assert set(told) == {(0.0, "starting"), (0.5, "painting 1 of 2 frames")}
+    assert told == sorted(told)
     failed = json.dumps({"event": "error", "message": "vnca: why", "exit_code": 2})
     words = script(tmp_path / "fails.py", f"print({failed!r}, file=sys.stderr); sys.exit(2)")
     with pytest.raises(package.request.ProblemError, match="vnca: why"):
@@ -157,8 +160,11 @@ def test_esc_ends_the_work(package: Modules, tmp_path: Path) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):  # and does not wait for ten minutes
-        package.work.run(sys.executable, script(tmp_path / "long.py", code), interrupted)
+    for source in (code, "time.sleep(600)"):  # also before it says anything
+        begun = time.monotonic()
+        with pytest.raises(KeyboardInterrupt):
+            package.work.run(sys.executable, script(tmp_path / "long.py", source), interrupted)
+        assert time.monotonic() - begun < 60  # and does not wait for ten minutes
 
 
 def test_a_node_writes_its_input_and_has_it_painted(
@@ -223,6 +229,37 @@ def test_a_farm_paints_each_painting_in_one_item(package: Modules, tmp_path: Pat
     assert merged.setInput.call_count == 2
     assert f"'{tmp_path}/a ink/smoke/smoke.####.vdb'" in package.farm.command(asked[0])
     assert "--resume" in package.farm.command(asked[0])
+
+
+def test_the_asset_has_the_parameters_and_a_node_that_shows(
+    package: Modules, tmp_path: Path
+) -> None:
+    subnet = package.hou.node.return_value.createNode.return_value.createNode.return_value
+    package.asset.build(tmp_path / "vnca.hda")
+    shown = subnet.createNode.return_value
+    shown.setInput.assert_called_once_with(0, subnet.indirectInputs.return_value[0])
+    shown.parm.return_value.set.assert_called_once_with(package.asset.COOK)
+    (name,), options = subnet.createDigitalAsset.call_args
+    assert name == package.asset.TYPE
+    assert options["hda_file_name"] == str(tmp_path / "vnca.hda")
+    definition = subnet.createDigitalAsset.return_value.type.return_value.definition.return_value
+    definition.setParmTemplateGroup.assert_called_once_with(
+        package.hou.ParmTemplateGroup.return_value
+    )
+    templates = package.hou.ParmTemplateGroup.call_args.args[0]
+    assert len(templates) == len(package.node.templates())
+    definition.save.assert_called_once_with(str(tmp_path / "vnca.hda"))
+    package.hou.node.return_value.createNode.return_value.destroy.assert_called_once_with()
+    # The Python SOP cooks by the parameters of the asset around it.
+    asset, node = node_of(package, tmp_path), MagicMock()
+    package.hou.frame.return_value = 3.0
+    (tmp_path / "painted").mkdir()
+    (tmp_path / "painted" / "smoke.0003.vdb").touch()
+    package.node.cook(node, asset)
+    node.geometry.return_value.loadFromFile.assert_called_once_with(
+        str(tmp_path / "painted" / "smoke.0003.vdb")
+    )
+    asset.geometry.assert_not_called()
 
 
 def test_package_and_shelf_are_well_formed() -> None:

@@ -56,13 +56,17 @@ class Told(io.TextIOBase):
         return sys.__stderr__.fileno()
 
 
-def end_with_blender():
-    """End when the standard input is closed: as SIGTERM ends vnca, and then at all events."""
+def end_with_blender(*, waits):
+    """End when the standard input is closed: as SIGTERM ends vnca, and then at all events.
+
+    Args:
+        waits: Whether a SIGTERM waits for the frame in work, which a second one ends.
+    """
 
     def wait():
         while os.read(0, 1024):  # through no buffer, whose lock would outlive the interpreter
             pass
-        for _ in range(2):  # the second does not wait for the frame in work
+        for _ in range(1 + waits):
             if callable(signal.getsignal(signal.SIGTERM)):
                 interrupt_main(signal.SIGTERM)
                 time.sleep(0.1)
@@ -78,17 +82,6 @@ def latest(folder, pattern):
     return max(paths, key=lambda path: path.stat().st_mtime_ns, default=None)
 
 
-def stage(job):
-    """Put cells where they belong, if they are not; the folder of what was staged, if it was."""
-    if not job["staged"]:
-        return None
-    import staging
-
-    folder = Path(job["sequence"]).parent
-    staging.stage(job["staged"], folder, tell)
-    return folder
-
-
 def paint(job):
     """Paint frames, and show the latest."""
     import picture
@@ -96,13 +89,16 @@ def paint(job):
 
     from vnca.cli import main
 
-    folder = stage(job)
+    folder = Path(job["out"]) / "staged"
+    if job["anew"]:
+        staging.clear(folder)
+    staging.stage(job["staged"], folder, tell, mesh=job["mesh"])
     painted, shown = Path(job["out"]) / "painted", Path(job["picture"])
 
     def show(path=None):
         path = path or latest(painted, "*.vdb")
         if path is not None:
-            picture.draw(path, shown)
+            picture.draw(path, shown, **job["shown"])
             tell("picture", path=str(shown))
 
     sys.stderr = Told(show)
@@ -113,25 +109,38 @@ def paint(job):
         last = latest(painted, "*.vdb")
         show(last)
         tell("finished", files=files, picture=str(shown), **picture.facts(last))
-        if folder is not None:
-            staging.clear(folder)
+        staging.clear(folder)
     return code
 
 
 def train(job):
     """Learn a style, and show what vnca shows of it."""
+    import picture
+    import staging
+
     from vnca.cli import main
 
-    stage(job)
     run = Path(job["out"])
+    folder = run / "staged"
+    staging.stage(job["staged"], folder, tell)
+    # Of what was learned before it was gone on with, if it is.
+    shown = latest(run, "**/preview_*.png")
 
     def show():
-        if (path := latest(run, "**/*.png")) is not None:
-            tell("picture", path=str(path))
+        nonlocal shown
+        path = latest(run, "**/preview_*.png")
+        if path is not None and path != shown:
+            shown = path
+            picture.fold(path, job["picture"])
+            tell("picture", path=job["picture"])
 
     sys.stderr = Told(show)
-    code = main(job["words"])
-    sys.stderr = sys.__stderr__
+    try:
+        code = main(job["words"])
+    finally:
+        sys.stderr = sys.__stderr__
+        if not (run / "checkpoint.safetensors").exists():  # or going on needs it
+            staging.clear(folder)
     if code == 0:
         show()
         tell("finished", model=str(run))
@@ -139,9 +148,18 @@ def train(job):
 
 
 def check(job):
-    """Tell what is installed here."""
-    import vnca
+    """Tell what is installed here, and whether the network that compares pictures is."""
+    import torch
 
+    import vnca
+    from vnca.core.errors import VncaError
+    from vnca.features import load_network
+
+    try:
+        load_network("efficientnet", torch.device("cpu"))
+    except VncaError as error:
+        tell("error", message=f"{sys.executable}: {error}", exit_code=2)
+        return 2
     tell("finished", version=vnca.__version__, python=sys.version.split()[0])
     return 0
 
@@ -158,7 +176,7 @@ def missing(job):
 def run(path):
     """Do the job; the exit code is vnca's."""
     job = json.loads(Path(path).read_text(encoding="utf-8"))
-    end_with_blender()
+    end_with_blender(waits=job["kind"] != "train")
     if absent := missing(job):
         tell("error", message=absent, exit_code=2)
         return 2

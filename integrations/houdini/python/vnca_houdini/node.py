@@ -121,14 +121,18 @@ def _write(source: "hou.Node", asked: Painting, operation: "hou.InterruptableOpe
         geometry.saveToFile(str(asked.source(number)))
 
 
-def cook(node: "hou.Node") -> None:
+def cook(node: "hou.Node", asked: "hou.Node | None" = None) -> None:
     """Show the painted VDBs of the frame; the input's, with a warning, where there are none.
+
+    Args:
+        node: The Python SOP.
+        asked: The node with the parameters, if that is another.
 
     Raises:
         hou.NodeError: If the parameters do not fit together.
     """
     try:
-        path = painting_of(node).painted(hou.frame())
+        path = painting_of(asked or node).painted(hou.frame())
     except ProblemError as error:
         raise hou.NodeError(str(error)) from error
     if not path.is_file():

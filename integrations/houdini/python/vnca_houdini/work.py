@@ -4,12 +4,17 @@
 import json
 import os
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from queue import Empty, Queue
+from threading import Thread
+from typing import IO
 
 from .request import ProblemError
 
 _HOUDINIS = ("PYTHONPATH", "PYTHONHOME", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
 """Variables by which Houdini's own libraries would get into another Python."""
+TICK = 0.2
+"""Seconds, at most, between two calls by which Houdini learns how far the work is."""
 
 
 def run(program: str, words: Sequence[str], tell: Callable[[float, str], None]) -> list[str]:
@@ -18,7 +23,7 @@ def run(program: str, words: Sequence[str], tell: Callable[[float, str], None]) 
     Args:
         program: The program.
         words: What it is told.
-        tell: Is given how far the work is, from 0 to 1, and a line.
+        tell: Is given how far the work is, from 0 to 1, and a line; often, so that Esc is heard.
 
     Returns:
         What it found worth noting.
@@ -38,25 +43,47 @@ def run(program: str, words: Sequence[str], tell: Callable[[float, str], None]) 
         errors="replace",
     )
     assert process.stderr is not None
+    done, line = 0.0, "starting"
     try:
-        for line in process.stderr:
-            told = _event(line)
+        for told in _events(process.stderr):
             if told.get("event") == "progress" and told["total"]:
                 line = f"{told['what']} {told['done']} of {told['total']} {told['unit']}"
-                tell(told["done"] / told["total"], line)
+                done = told["done"] / told["total"]
             elif told.get("event") == "note":
                 notes.append(told["text"])
             elif told.get("event") == "error":
                 message = told["message"]
+            tell(done, line)
         code = process.wait()
     finally:
         if process.poll() is None:
             process.kill()
             process.wait()
-        process.stderr.close()
     if code:
         raise ProblemError(message or f"{program} ended unexpectedly, with code {code}")
     return notes
+
+
+def _events(stream: "IO[str]") -> "Iterator[dict]":
+    """What is told, and an empty event whenever nothing was for a while."""
+    lines: Queue[str] = Queue()
+
+    def read() -> None:
+        with stream:
+            for line in stream:
+                lines.put(line)
+        lines.put("")
+
+    Thread(target=read, daemon=True).start()
+    while True:
+        try:
+            line = lines.get(timeout=TICK)
+        except Empty:
+            yield {}
+            continue
+        if not line:
+            return
+        yield _event(line)
 
 
 def _event(line: str) -> dict:

@@ -8,8 +8,9 @@ from typing import Any
 import bpy
 from mathutils import Matrix
 
+from ..request import Smoke, velocity_scale
 from . import material, mixing
-from .request import Smoke, velocity_scale
+from .mask import placed
 from .source import shift_of
 
 
@@ -31,7 +32,7 @@ def show(scene: bpy.types.Scene, smoke: Smoke, told: Mapping[str, Any]) -> bpy.t
     data = painted.data
     _set_files(data, smoke, told, source)
     _set_place(painted, source, smoke)
-    _set_material(painted, float(told["extinction"]))
+    _set_material(painted, float(told["extinction"]), keeps=bool(told["keeps"]))
     mixing.adjust(painted, settings)
     if settings.hide_source and source.library is None:
         source.hide_render = True
@@ -86,20 +87,15 @@ def _set_place(painted: bpy.types.Object, source: bpy.types.Object, smoke: Smoke
     """On the cells of the smoke, and wherever its object goes from now on."""
     painted.parent = source
     painted.matrix_parent_inverse = Matrix.Identity(4)
-    if smoke.placement is None:
-        painted.matrix_basis = Matrix.Identity(4)
-        return
-    scale = Matrix.Diagonal((*smoke.placement.scale, 1))
-    painted.matrix_basis = Matrix.Translation(smoke.placement.shift) @ scale
+    painted.matrix_basis = placed(smoke.placement)
 
 
-def _set_material(painted: bpy.types.Object, extinction: float) -> None:
+def _set_material(painted: bpy.types.Object, extinction: float, *, keeps: bool) -> None:
     """As opaque as vnca shows it; a material of the artist's own stays.
 
     Blender counts the density of a volume in lengths of the object, and emission too, so neither
     depends on how large the object is.
     """
-    if painted.active_material is not None:
-        material.set_extinction(painted.active_material, extinction)
-        return
-    painted.data.materials.append(material.make(painted.name, extinction))
+    if painted.active_material is None:
+        painted.data.materials.append(material.make(painted.name))
+    material.set_files(painted.active_material, extinction, keeps=keeps)

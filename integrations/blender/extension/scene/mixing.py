@@ -35,7 +35,10 @@ def adjust(painted: bpy.types.Object, settings: bpy.types.PropertyGroup) -> None
 def _set_strength(modifier: bpy.types.Modifier, strength: float) -> None:
     for item in modifier.node_group.interface.items_tree:
         if item.item_type == "SOCKET" and item.name == _STRENGTH:
-            modifier[item.identifier] = strength
+            if hasattr(modifier, "properties"):  # Blender 5.2 and later
+                getattr(modifier.properties.inputs, item.identifier).value = strength
+            else:
+                modifier[item.identifier] = strength
     modifier.id_data.update_tag()
 
 
@@ -77,8 +80,9 @@ def _group() -> bpy.types.NodeTree:
     mix.data_type = "VECTOR"
     for column, node in enumerate((given, read, mix, write, taken)):
         node.location = 220 * column, 0
+    # One node goes by the type of a socket, the other by that of an attribute.
+    read.data_type, write.data_type = "VECTOR", "VECTOR_FLOAT"
     for node in (read, write):
-        node.data_type = "VECTOR"
         node.inputs["Name"].default_value = "Cd"
     sockets = {socket.identifier: socket for socket in (*mix.inputs, *mix.outputs)}
     sockets["A_Vector"].default_value = (1, 1, 1)

@@ -6,23 +6,23 @@ from pathlib import Path
 
 import bpy
 
-from . import cache
-from .problem import ProblemError
-from .request import Look, Smoke, Staged
-from .settings import domain_of
+from .. import cache
+from ..problem import ProblemError
+from ..request import STAGED, Look, Smoke, Staged
+from ..settings import domain_of
+from . import mask
 
 _NUMBER = re.compile(r"(\d+)(?=\D*$)")
 NOTHING_CHOSEN = "Choose the smoke: a fluid domain of gas, or a volume"
-STAGED = "staged/smoke_####.vdb"
-"""Frames of a cache that were put in their places, in the folder of a painting."""
 
 
-def smoke_of(scene: bpy.types.Scene, folder: Path | None) -> Smoke:
+def smoke_of(scene: bpy.types.Scene, folder: Path, *, masked: bool = True) -> Smoke:
     """The smoke that is chosen in the scene, with all frames that there are.
 
     Args:
         scene: The scene.
-        folder: Of the painting, where frames are staged; None where only looked at.
+        folder: Of the painting; in its folder `staged` frames are copied where they have to be.
+        masked: Whether they get what the mask of the scene needs.
 
     Raises:
         ProblemError: If nothing is chosen, or its files cannot be used.
@@ -30,12 +30,14 @@ def smoke_of(scene: bpy.types.Scene, folder: Path | None) -> Smoke:
     source = scene.vnca.source
     if source is None:
         raise ProblemError(NOTHING_CHOSEN)
-    domain = domain_of(source)
+    domain, staged = domain_of(source), str(folder / "staged")
     if domain is not None:
-        return _of_domain(scene, source, domain, folder)
-    if source.type != "VOLUME":
+        smoke = _of_domain(scene, source, domain, staged)
+    elif source.type == "VOLUME":
+        smoke = _of_volume(scene, source)
+    else:
         raise ProblemError(f"{source.name}: neither a fluid domain of gas nor a volume")
-    return _of_volume(scene, source)
+    return smoke.masked(staged) if masked and mask.is_wanted(scene.vnca) else smoke
 
 
 def look_of(settings: bpy.types.PropertyGroup) -> Look:
@@ -124,7 +126,7 @@ def _of_domain(
     scene: bpy.types.Scene,
     source: bpy.types.Object,
     domain: "bpy.types.FluidDomainSettings",
-    out: Path | None,
+    copies: str,
 ) -> Smoke:
     if domain.cache_data_format != "OPENVDB":
         raise ProblemError(
@@ -156,7 +158,7 @@ def _of_domain(
     voxel = max(sides) / max(config.cells)
     sequence, staged = str(folder / "data" / "fluid_data_####.vdb"), ()
     if noise or not all(one.is_whole for one in configs.values()):
-        sequence = str((out or folder) / STAGED)
+        sequence = f"{copies}/{STAGED}"
         finer = domain.noise_scale if noise else 1
         staged = tuple(
             Staged(
@@ -200,14 +202,15 @@ def _of_volume(scene: bpy.types.Scene, source: bpy.types.Object) -> Smoke:
     numbers, sequence = (1,), str(path)
     if number is not None:
         numbers = (int(number[1]),)
-    if volume.is_sequence and number is not None:
+    is_sequence = volume.is_sequence and number is not None
+    if is_sequence:
         before, after = path.stem[: number.start()], path.stem[number.end() :]
         digits = len(number[1])
         form = re.compile(re.escape(before) + r"(\d+)" + re.escape(after) + r"\.vdb", re.I)
         found = (form.fullmatch(other.name) for other in path.parent.glob("*"))
         numbers = tuple(sorted(int(match[1]) for match in found if match))
         sequence = str(path.parent / f"{before}{'#' * digits}{after}{path.suffix}")
-    if not (numbers if volume.is_sequence else path.is_file()):
+    if not (numbers if is_sequence else path.is_file()):
         raise ProblemError(f"{path}: there is no such file")
     return Smoke(
         name=source.name,
@@ -217,7 +220,7 @@ def _of_volume(scene: bpy.types.Scene, source: bpy.types.Object) -> Smoke:
         fps=_fps(scene),
         time_scale=scene.vnca.time_scale,
         up_axis=_up_axis(source),
-        is_sequence=volume.is_sequence,
+        is_sequence=is_sequence,
     )
 
 
