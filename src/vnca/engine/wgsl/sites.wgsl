@@ -16,6 +16,8 @@ struct Sites {
 
 const NOWHERE = 0xffffffffu;
 
+// Rows from `cells` on belong to cells beside the active ones, which have a place and no state.
+//
 // Behind each other: the map, a number of a brick or NOWHERE for each of its places, z fastest; the
 // coordinates of the bricks, three each; the rows of their cells, 512 each; and where the cell of
 // each row lies, number of brick · 512 + place in it.

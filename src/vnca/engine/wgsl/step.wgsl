@@ -54,7 +54,7 @@ fn update(row: u32) {
   for (var k = 0u; k < 27u; k++) {
     let offset = vec3i(vec3u(k / 9u, (k / 3u) % 3u, k % 3u)) - 1;
     let beside = row_of(bordered(cell + offset));
-    if (beside == NOWHERE) {
+    if (beside >= sites.cells) {
       continue;  // The outside is zero.
     }
     let four = stencil[2u * k];
