@@ -176,5 +176,5 @@ export function run(
 }
 
 export function mebibytes(size: number): string {
-  return `${Math.ceil(size / 2 ** 20)} MiB`;
+  return `${Number((size / 2 ** 20).toPrecision(3))} MiB`;
 }

@@ -57,7 +57,7 @@ export class Layer {
 
   private constructor(
     private readonly gpu: Gpu,
-    readonly rule: Rule,
+    public rule: Rule,
     private readonly smoke: Smoke,
     private readonly pipelines: Pipelines,
     readonly isHalf: boolean,
@@ -90,6 +90,19 @@ export class Layer {
       gpu.compute(painting, "rim"),
     ]);
     return new Layer(gpu, rule, smoke, { step, condition, carry, paint, rim }, isHalf);
+  }
+
+  /** The same rule with other weights goes on from its state; false where it is of another shape. */
+  learn(rule: Rule): boolean {
+    const shape = (of: Rule): string =>
+      JSON.stringify([of.channels, of.hidden, of.columns, of.width, of.dilation, of.decoder.length].map(
+        (each) => (typeof each === "object" && "values" in each ? [each.rows, each.columns] : each),
+      ));
+    if (shape(rule) !== shape(this.rule)) return false;
+    this.gpu.write(this.weights, packedWeights(rule, 4 * quarters(rule.width + 1), this.isHalf));
+    this.gpu.write(this.network, packedDecoder(rule));
+    this.rule = rule;
+    return true;
   }
 
   /** Take up a frame: cells that were active before keep their state. */

@@ -1,4 +1,4 @@
-"""What the tests of the page are given: sites, hostile ones among them, and what vnca itself paints.
+"""What the tests of the page are given: sites, hostile ones too, and what vnca itself paints.
 
 python web/tests/material.py build/browser
 """
@@ -31,6 +31,7 @@ REFINEMENTS = (1, 2)
 
 
 def main(out: Path) -> None:
+    """Make all of it in a folder."""
     smoke = out / "smoke"
     for _ in simulate("plume", out=smoke, resolution=RESOLUTION, frames=12 + FRAMES):
         pass

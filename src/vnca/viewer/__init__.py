@@ -61,12 +61,17 @@ def page_file(name: str) -> bytes:
     return files("vnca.viewer").joinpath("page", name).read_bytes()
 
 
+def model_name(number: int) -> str:
+    """The file of a rule, by its number among those of a show."""
+    return f"rules/{number}.safetensors"
+
+
 def contents(show: Show) -> dict[str, bytes]:
     """The files that a page is made of, by name, but for the sequence."""
-    made = {name: page_file(name) for name in PAGE}
+    made: dict[str, bytes] = {name: page_file(name) for name in PAGE}
     listed = []
     for number, rule in enumerate(show.rules):
-        entry = {"name": rule.name, "title": rule.title, "model": f"rules/{number}.safetensors"}
+        entry = {"name": rule.name, "title": rule.title, "model": model_name(number)}
         made[entry["model"]] = rule.model
         if rule.thumbnail is not None:
             entry["thumbnail"] = f"rules/{number}.webp"

@@ -15,7 +15,7 @@ from typing import TypeAlias
 
 from vnca.viewer import POLICY
 
-Content: TypeAlias = bytes | Path | Callable[[], bytes]
+Content: TypeAlias = "bytes | Path | Callable[[], bytes]"
 """A file's bytes, its path, or what makes them when they are asked for."""
 KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -118,7 +118,7 @@ class _Handler(BaseHTTPRequestHandler):
                 return content.read_bytes()
             except OSError:
                 return None
-        return content() if callable(content) else content
+        return content if content is None or isinstance(content, bytes) else content()
 
     def _send(
         self,

@@ -7,8 +7,8 @@ the frames one after the other, each a zlib stream; all numbers are little-endia
 - `lattice_to_world`, `box`: where its cells lie, as in a model file;
 - `density`, `speed`: what the greatest byte of a density, and of a component of velocity, stands
   for; no speed where there is no velocity;
-- `frames`: of each its `number`, the `offset` of its stream from the end of the header, its `length`
-  in bytes, and how many `bricks` it has.
+- `frames`: of each its `number`, the `offset` of its stream from the end of the header, its
+  `length` in bytes, and how many `bricks` it has.
 
 A stream has the coordinates of the bricks, counted from the brick that holds the lowest cell of the
 box, three unsigned 16-bit numbers each; then densities, 512 bytes a brick; then each component of
