@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from vnca.recipe import SILENT
-from vnca.recipe.viewing import ViewRun, run
+from vnca.recipe.viewing import ViewRun
+from vnca.recipe.viewing import run as show
 from vnca.rule.model import MODEL_NAME, style_names
 from vnca.viewer.smoke_file import SmokeFile
 
@@ -69,7 +70,7 @@ def test_the_page_is_served_until_it_is_closed(smoke: Path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(ViewRun(model="ink", sequence=str(smoke)), SILENT, opened)
+        show(ViewRun(model="ink", sequence=str(smoke)), SILENT, opened)
     assert there.is_set()
     with pytest.raises(OSError, match="refused"):
         urllib.request.urlopen(addresses[0])
@@ -83,3 +84,47 @@ def test_mistakes_are_one_line(vnca: Vnca, smoke: Path, tmp_path: Path) -> None:
     file.write_text("mine")
     assert str(file) in vnca("view", "ink", smoke, "--export", file).complaint
     assert file.read_text() == "mine"
+
+
+def test_a_training_is_watched_while_it_runs(
+    vnca: Vnca,
+    frame: Path,
+    style: Path,
+    tiny: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from vnca.cli import train
+
+    seen: dict[str, Any] = {}
+
+    def opened(address: str) -> None:
+        for name in ("show.json", "run.json"):
+            with urllib.request.urlopen(address + name) as answer:
+                seen[name] = json.load(answer)
+        with urllib.request.urlopen(address + seen["show.json"]["rules"][0]["model"]) as answer:
+            seen["model"] = answer.read()
+
+    monkeypatch.setattr(train.webbrowser, "open", opened)
+    run = tmp_path / "watched"
+    told = vnca("train", frame, style, "--out", run, *tiny, "--view")
+    assert told.code == 0, told.err
+    assert "the training can be watched at http://127.0.0.1:" in told.err
+    assert seen["show.json"]["run"]
+    assert seen["show.json"]["rules"][0]["name"] == "watched"
+    assert seen["run.json"]["iteration"] == 0
+    assert len(seen["model"]) > 1000
+    # Afterwards, in its folder: the frame of the training is found, and the curves.
+    page: list[dict[str, Any]] = []
+
+    def afterwards(address: str) -> None:
+        with urllib.request.urlopen(address + "run.json") as answer:
+            page.append(json.load(answer))
+        with urllib.request.urlopen(address + "rules/0.safetensors") as answer:
+            assert answer.read() == (run / MODEL_NAME).read_bytes()
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        show(ViewRun(model=str(run)), SILENT, afterwards)
+    assert page[0]["iteration"] == page[0]["iterations"] == 2
+    assert page[0]["curves"]["total"]

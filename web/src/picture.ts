@@ -54,6 +54,7 @@ export class Picture {
   private parts = 0;
   private size: Vector = [];
   private textures: GPUTexture[] = [];
+  private buffers: FrameBuffers | null = null;
   private drawn: GPUTexture | null = null;
   private reached: GPUTexture | null = null;
   private blocks: { first: Vector; size: Vector; times: number; slots: GPUBuffer } | null = null;
@@ -80,7 +81,7 @@ export class Picture {
       gpu.compute(`${sitesCode}${smokeCode}${volumeCode}`, "volume"),
       gpu.compute(lightCode, "gather"),
       gpu.compute(lightCode, "sweep"),
-      gpu.render(marchCode, "march", PICTURE),
+      gpu.render(`${smokeCode}${marchCode}`, "march", PICTURE),
     ]);
     return new Picture(gpu, smoke, { volume, gather, sweep, march });
   }
@@ -135,6 +136,7 @@ export class Picture {
 
   /** What is there, of one rule or of a second mixed over it, and how light reaches it. */
   draw(buffers: FrameBuffers, layers: Layer[], brushed: GPUBuffer, look: Look): void {
+    this.buffers = buffers;
     let under = this.nothing;
     layers.forEach((layer, at) => {
       const numbers = new ArrayBuffer(32);
@@ -235,7 +237,7 @@ export class Picture {
       (block, axis) => (block + 0.5) * blocks.times - 0.5 - this.smoke.lower[axis] * parts + 1,
     );
     const numbers = new Float32Array([
-      ...this.place(pinhole(camera)), 0,
+      ...this.place(pinhole(camera)), parts,
       ...cells(forward), stride,
       ...cells(scaled(across, extent)), aspect,
       ...cells(scaled(up, extent)), (look.gamma / parts) * stride,
@@ -264,6 +266,8 @@ export class Picture {
       3: this.sampler,
     });
     pass.setBindGroup(0, group);
+    pass.setBindGroup(1, gpu.bound(march, 1, {}));
+    pass.setBindGroup(2, gpu.bound(march, 2, { 0: this.buffers!.uniform, 1: this.buffers!.bytes }));
     const begin = Math.round(left * into.width);
     const wide = Math.round(right * into.width) - begin;
     if (wide > 0) {

@@ -39,7 +39,7 @@ export async function serve(folder) {
 }
 
 /** A page, and lists of what it asked of others and of what went wrong in it. */
-export async function open(browser, address, { size = [160, 160], script, ...context } = {}) {
+export async function open(browser, address, { size = [200, 240], script, ...context } = {}) {
   const [width, height] = size;
   const own = await browser.newContext({ viewport: { width, height }, ...context });
   const page = await own.newPage();

@@ -152,7 +152,8 @@ test("what is erased heals", slow, async () => {
   });
   assert.ok(found.after > found.before + 20, `${found.after - found.before} cells erased`);
   assert.ok(found.last <= found.before);
-  assert.ok(apart(found.whole, found.erased) > 2 * apart(found.whole, found.healed) - 1);
+  assert.ok(apart(found.whole, found.erased) > 0.3, "the hole is seen");
+  assert.ok(apart(found.erased, found.healed) > 0.3, "and what grows in it");
 });
 
 test("two styles are mixed by slider and by brush", slow, async () => {
@@ -224,8 +225,8 @@ test("the canvas follows the window", slow, async () => {
   const { page } = still;
   await page.setViewportSize({ width: 230, height: 140 });
   await page.waitForFunction(() => document.getElementById("canvas").width === 230);
-  await page.setViewportSize({ width: 160, height: 160 });
-  await page.waitForFunction(() => document.getElementById("canvas").height === 160);
+  await page.setViewportSize({ width: 200, height: 240 });
+  await page.waitForFunction(() => document.getElementById("canvas").height === 240);
 });
 
 test("keys, wheel and fingers move the camera and choose tools", slow, async () => {
@@ -240,12 +241,12 @@ test("keys, wheel and fingers move the camera and choose tools", slow, async () 
   assert.equal(turned.azimuth, before.azimuth + 4);
   assert.equal(turned.tool, "erase");
   await page.keyboard.press("1");
-  await page.mouse.move(80, 60);
+  await page.mouse.move(130, 40);
   await page.mouse.wheel(0, -300);
   const near = await camera();
   assert.ok(near.distance < turned.distance);
   await page.mouse.down();
-  await page.mouse.move(100, 70, { steps: 3 });
+  await page.mouse.move(150, 50, { steps: 3 });
   await page.mouse.up();
   const orbited = await camera();
   assert.ok(orbited.elevation > near.elevation && orbited.azimuth !== near.azimuth);
@@ -305,7 +306,7 @@ test("pictures and films are saved", slow, async () => {
   const [name, png] = await saved("Save a picture");
   assert.match(name, /^smoke_.*\.png$/);
   assert.equal(png.subarray(1, 4).toString(), "PNG");
-  assert.deepEqual([png.readUInt32BE(16), png.readUInt32BE(20)], [160, 160]);
+  assert.deepEqual([png.readUInt32BE(16), png.readUInt32BE(20)], [200, 240]);
   const [film, webm] = await saved("Save a film");
   assert.match(film, /\.webm$/);
   assert.equal(webm.readUInt32BE(0), 0x1a45dfa3);

@@ -4,7 +4,7 @@ import json
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 
@@ -14,7 +14,14 @@ from vnca.core.volume import Volume
 from vnca.io import SmokeFormat, with_fitted_scale
 from vnca.io.sequence import FrameSequence
 from vnca.recipe import Watch, load, recorded_smoke, tracked
-from vnca.recipe.sequence import open_sequence, region_of, sequence_region, volumes
+from vnca.recipe.sequence import (
+    beside,
+    open_sequence,
+    read_alone,
+    region_of,
+    sequence_region,
+    volumes,
+)
 from vnca.recipe.simulation import simulate
 from vnca.rule.model import (
     CONFIG_NAME,
@@ -25,10 +32,11 @@ from vnca.rule.model import (
     style_names,
     style_thumbnail,
 )
-from vnca.viewer import SMOKE_NAME, Show, ShownRule, contents
-from vnca.viewer.server import PageServer
+from vnca.viewer import RUN_NAME, SMOKE_NAME, Show, ShownRule, contents, model_name
+from vnca.viewer.server import Content, PageServer
 from vnca.viewer.site import export
 from vnca.viewer.smoke_file import write_smoke_file
+from vnca.viewer.training_run import progress, untaught
 
 FIRST_STYLE = "stained_glass"
 """The style that paints where no model is given."""
@@ -76,42 +84,93 @@ def run(options: ViewRun, watch: Watch, opened: Callable[[str], None]) -> None:
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
-    show, frames, region = _shown(options, watch)
-
-    def write(path: Path) -> None:
-        write_smoke_file(path, frames, region, name=show.title, fps=options.page_fps)
-
+    shown = _shown(options, watch)
     if options.export is not None:
-        export(show, options.export, write)
+        export(shown.show, options.export, shown.write_smoke)
         watch.made("site", options.export)
         return
-    with tempfile.TemporaryDirectory(prefix="vnca-view-") as folder:
-        smoke = Path(folder) / SMOKE_NAME
-        write(smoke)
-        with served({**contents(show), SMOKE_NAME: smoke}, options.port) as server:
-            opened(server.address)
-            server.wait()
+    folder = Path(options.model or "")
+    run_folder = folder if (folder / CONFIG_NAME).exists() else None
+    with _served(shown, options.port, run_folder) as server:
+        opened(server.address)
+        server.wait()
 
 
 @contextmanager
-def served(files: dict[str, bytes | Path], port: int) -> Iterator[PageServer]:
-    """A page that is served while the context lasts.
+def training_watched(
+    run_folder: Path, frame: Path, smoke: SmokeFormat, watch: Watch, opened: Callable[[str], None]
+) -> Iterator[None]:
+    """A page on which a training can be watched that goes on while the context lasts.
+
+    Args:
+        run_folder: Where it writes its model and curves.
+        frame: What it is trained on.
+        smoke: How that is read.
+        watch: Is told what happens.
+        opened: Is given the address of the page once it is there.
+
+    Raises:
+        VncaError: If the frame cannot be read.
+    """
+    laid, region = region_of([read_alone(frame, beside(frame, smoke), watch)])
+    rule = ShownRule(run_folder.resolve().name, "the rule as it learns", b"")
+    shown = _Shown(Show(frame.stem, [rule, *_library(FIRST_STYLE)], {}), laid, region, 24.0)
+    with _served(shown, 0, run_folder) as server:
+        opened(server.address)
+        yield
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """What a page shows: its frames can be gone through again."""
+
+    show: Show
+    frames: Iterable[Volume]
+    region: Region
+    fps: float
+
+    def write_smoke(self, path: Path) -> None:
+        """The sequence, for the page."""
+        write_smoke_file(path, self.frames, self.region, name=self.show.title, fps=self.fps)
+
+
+@contextmanager
+def _served(shown: _Shown, port: int, run_folder: Path | None) -> Iterator[PageServer]:
+    """A page that is served while the context lasts; of a run with how it goes on.
 
     Raises:
         OutputError: If the port is taken.
     """
-    try:
-        server = PageServer(files, port=port)
-    except OSError as error:
-        raise OutputError(f"`port` {port}: cannot be listened on ({error.strerror})") from error
-    try:
-        yield server
-    finally:
-        server.close()
+    with tempfile.TemporaryDirectory(prefix="vnca-view-") as folder:
+        smoke = Path(folder) / SMOKE_NAME
+        shown.write_smoke(smoke)
+        show = replace(shown.show, run=run_folder is not None)
+        files: dict[str, Content] = {**contents(show), SMOKE_NAME: smoke}
+        if run_folder is not None:
+            density = next(iter(shown.frames)).density_field.values
+            blank = untaught(density, Path(folder) / MODEL_NAME)
+            files |= _of_run(run_folder, blank)
+        try:
+            server = PageServer(files, port=port)
+        except OSError as error:
+            raise OutputError(f"`port` {port}: cannot be listened on ({error.strerror})") from error
+        try:
+            yield server
+        finally:
+            server.close()
 
 
-def _shown(options: ViewRun, watch: Watch) -> tuple[Show, Iterable[Volume], Region]:
-    """What the page shows; the frames can be gone through again."""
+def _of_run(folder: Path, blank: bytes) -> dict[str, Content]:
+    """The files of a page that change while a training goes on."""
+    path = folder / MODEL_NAME
+
+    def model() -> bytes:
+        return path.read_bytes() if path.exists() else blank
+
+    return {model_name(0): model, RUN_NAME: lambda: progress(folder)}
+
+
+def _shown(options: ViewRun, watch: Watch) -> _Shown:
     given, smoke = _given(options)
     rules = _rules(given, options)
     asked = options.sequence or (None if given is None else _training_frame(options.model))
@@ -119,12 +178,13 @@ def _shown(options: ViewRun, watch: Watch) -> tuple[Show, Iterable[Volume], Regi
         watch.note("no sequence given: a plume is simulated")
         frames = [*simulate("plume", resolution=_RESOLUTION, frames=_FRAMES, watch=watch)]
         laid, region = region_of(frames)
-        return Show("a plume", rules, {}), laid, region
+        return _Shown(Show("a plume", rules, {}), laid, region, options.page_fps)
     sequence = open_sequence(asked, options.frames, watch)
     smoke = with_fitted_scale(smoke, sequence)
     region = sequence_region(sequence, smoke, watch)
     title = sequence[0].path.parent.name if len(sequence) > 1 else sequence[0].path.stem
-    return Show(title, rules, {}), _Frames(sequence, smoke, region, watch), region
+    frames = _Frames(sequence, smoke, region, watch)
+    return _Shown(Show(title, rules, {}), frames, region, options.page_fps)
 
 
 @dataclass(frozen=True)
@@ -164,19 +224,23 @@ def _training_frame(model: str | None) -> str | None:
 def _rules(given: Model | None, options: ViewRun) -> list[ShownRule]:
     """The model that is asked for, and the styles of the library."""
     first = options.model if given is None and options.model else FIRST_STYLE
-    names = sorted(style_names(), key=lambda name: name != first)
-    rules = [
-        ShownRule(
-            name,
-            str(load_style(name).training.get("title", "")),
-            style_bytes(name),
-            style_thumbnail(name),
-        )
-        for name in names
-    ]
+    rules = _library(first)
     if given is None:
         return rules
     path = Path(options.model or "")
     path = path / MODEL_NAME if path.is_dir() else path
     name = path.parent.resolve().name if path.name == MODEL_NAME else path.stem
     return [ShownRule(name, str(given.training.get("style", "")), path.read_bytes()), *rules]
+
+
+def _library(first: str) -> list[ShownRule]:
+    """The styles of the library, one of them before the others."""
+    return [
+        ShownRule(
+            name,
+            str(load_style(name).training.get("title", "")),
+            style_bytes(name),
+            style_thumbnail(name),
+        )
+        for name in sorted(style_names(), key=lambda name: name != first)
+    ]

@@ -15,6 +15,8 @@ SHOW_NAME = "show.json"
 """What the page reads first: what there is to show."""
 SMOKE_NAME = "smoke.bin"
 """The sequence."""
+RUN_NAME = "run.json"
+"""How far a training has come that the page watches."""
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
     "connect-src 'self'; media-src blob:; base-uri 'none'; form-action 'none'"
@@ -58,7 +60,7 @@ class Show:
 
 def page_file(name: str) -> bytes:
     """A file of the page."""
-    return files("vnca.viewer").joinpath("page", name).read_bytes()
+    return files("vnca.viewer").joinpath("page").joinpath(name).read_bytes()
 
 
 def model_name(number: int) -> str:

@@ -50,8 +50,11 @@ class PageServer:
             OSError: If the port is taken.
         """
         self._token = secrets.token_urlsafe(16)
-        handler = type("Handler", (_Handler,), {"files": files, "token": self._token})
+        handler: type[_Handler] = type(
+            "Handler", (_Handler,), {"files": files, "token": self._token}
+        )
         self._server = ThreadingHTTPServer(("127.0.0.1", port), handler)
+        handler.port = self._server.server_port
         self._server.daemon_threads = True
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
@@ -75,6 +78,7 @@ class PageServer:
 class _Handler(BaseHTTPRequestHandler):
     files: Mapping[str, Content]
     token: str
+    port: int
     protocol_version = "HTTP/1.1"
     server_version = "vnca"
     sys_version = ""
@@ -106,8 +110,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _asked(self) -> bytes | None:
         """What is asked for, if it is asked by the right address and is there."""
-        port = self.server.server_address[1]
-        if self.headers.get("Host") not in (f"127.0.0.1:{port}", f"localhost:{port}"):
+        if self.headers.get("Host") not in (f"127.0.0.1:{self.port}", f"localhost:{self.port}"):
             return None
         begin, _, name = self.path.partition("?")[0].removeprefix("/").partition("/")
         if not secrets.compare_digest(begin.encode(), self.token.encode()):

@@ -2,7 +2,7 @@
 // whole multiples of a step from the eye, and colour is the quotient of what is interpolated.
 
 struct Camera {
-  eye: vec4f,        // In cells of what is drawn.
+  eye: vec4f,        // In cells of what is drawn; w: their number in a cell of the smoke.
   middle: vec4f,     // The direction of the picture's middle, for a length of depth; w: the step.
   right: vec4f,      // What is added to it for a picture's height to the right; w: aspect,
   up: vec4f,         // and for one up; w: γ times the step.
@@ -11,6 +11,8 @@ struct Camera {
   light: vec4f,      // glow, strength, ambient, and 1 where there is a light.
   octaves: vec4f,    // Their weights over what faces the light.
 }
+
+// Where a file has no brick there is no smoke within a cell (`viewer/smoke_file.py`): rays leap.
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var drawn: texture_3d<f32>;
@@ -37,6 +39,29 @@ fn lit(cell: vec3f) -> f32 {
     + camera.light.y * (camera.light.z + (1.0 - camera.light.z) * min(direct, 1.0));
 }
 
+// The brick of the cell of the smoke that is nearest to a place, in bricks.
+fn brick_of(cell: vec3f) -> vec3i {
+  let parts = camera.eye.w;
+  let coarse = vec3i(floor((cell - 0.5) / parts)) + smoke.lower;
+  return coarse >> vec3u(3);
+}
+
+fn is_stored(brick: vec3i) -> bool {
+  let at = brick - smoke.first;
+  if (any(at < vec3i(0)) || any(at >= smoke.span)) {
+    return false;
+  }
+  return bytes[u32((at.x * smoke.span.y + at.y) * smoke.span.z + at.z)] != NONE;
+}
+
+// The depth at which a ray leaves a brick.
+fn leaving(brick: vec3i, way: vec3f) -> f32 {
+  let low = vec3f(8 * brick - smoke.lower) * camera.eye.w + 0.5;
+  let far = select(low, low + 8.0 * camera.eye.w, way > vec3f(0.0));
+  let depth = (far - camera.eye.xyz) / way;
+  return min(depth.x, min(depth.y, depth.z));
+}
+
 @fragment
 fn march(@location(0) place: vec2f) -> @location(0) vec4f {
   let ray = camera.middle.xyz + place.x * camera.right.w * camera.right.xyz + place.y * camera.up.xyz;
@@ -53,6 +78,11 @@ fn march(@location(0) place: vec2f) -> @location(0) vec4f {
   var seen = 0.0;
   for (var k = first; k <= last; k += 1.0) {
     let cell = camera.eye.xyz + k * step * way;
+    let brick = brick_of(cell);
+    if (!is_stored(brick)) {
+      k = max(k, ceil(leaving(brick, way) / step) - 1.0);
+      continue;
+    }
     let value = textureSampleLevel(drawn, between, (cell + 0.5) / camera.size.xyz, 0.0);
     if (value.w <= 0.0) {
       continue;
