@@ -39,11 +39,12 @@ fn lit(cell: vec3f) -> f32 {
     + camera.light.y * (camera.light.z + (1.0 - camera.light.z) * min(direct, 1.0));
 }
 
-// The brick of the cell of the smoke that is nearest to a place, in bricks.
+// The brick of the cell of the box that is nearest to a place, in bricks: smoke fades over the cell
+// beside the box.
 fn brick_of(cell: vec3f) -> vec3i {
   let parts = camera.eye.w;
   let coarse = vec3i(floor((cell - 0.5) / parts)) + smoke.lower;
-  return coarse >> vec3u(3);
+  return clamp(coarse, smoke.lower, smoke.upper - 1) >> vec3u(3);
 }
 
 fn is_stored(brick: vec3i) -> bool {
