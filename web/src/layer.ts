@@ -239,6 +239,11 @@ export class Layer {
     });
   }
 
+  /** How many cells have a colour: the active ones, and those beside them. */
+  get shown(): number {
+    return this.sites === null ? 0 : this.sites.cells + this.sites.beside;
+  }
+
   /** Look at the state: `samples` points along each axis of each of the `parts` of a cell. */
   paint(parts: number, samples: number): void {
     const { gpu, rule, sites } = this;

@@ -239,9 +239,15 @@ export class Stage {
     };
   }
 
-  /** How finely the volume is drawn: only a decoder knows what is between cells. */
+  /** How finely the volume is drawn: only a decoder knows what is between cells; and no more finely
+   * than the GPU binds. */
   get parts(): number {
-    return this.layers.every((layer) => layer.rule.decoder.length > 0) ? this.settings.detail : 1;
+    if (!this.layers.every((layer) => layer.rule.decoder.length > 0)) return 1;
+    const most = this.gpu.device.limits.maxStorageBufferBindingSize;
+    const cells = Math.max(...this.layers.map((layer) => layer.shown));
+    let parts = this.settings.detail;
+    while (parts > 1 && 16 * cells * parts ** 3 > most) parts--;
+    return parts;
   }
 
   /** Bring the volumes up to date with state and look. */

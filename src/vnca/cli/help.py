@@ -36,7 +36,7 @@ COMMON: Mapping[str, tuple[str, ...]] = {
     ),
     "train": (
         *("out", "preset", "iterations", "view.size", "seed", "texture", "graft", *_SMOKE),
-        *("device", "memory-budget", "overwrite", "view"),
+        *("device", "memory-budget", "overwrite"),
     ),
     "stylize": (
         *("out", "frames", "refine", "preview", "strength", "density-strength", "gamma", "seed"),
