@@ -65,7 +65,8 @@ function parsed(bytes: ArrayBuffer, name: string): Rule {
   const tensor = (key: string): Matrix => matrix(bytes, 8 + length, header[key], `${name}: ${key}`);
 
   const number = (value: unknown, low: number, high: number, what: string): number => {
-    check(typeof value === "number" && value >= low && value <= high, `${what}: ${String(value)}`);
+    const fits = typeof value === "number" && value >= low && value <= high;
+    check(fits, `damaged model (${what} is not a number from ${low} to ${high})`);
     return value as number;
   };
   const channels = number(shape.channels, 4, MOST.channels, "channels");
