@@ -14,6 +14,7 @@ const RANGES: Partial<Record<keyof Settings, [number, number]>> = {
   density: [0.001, 1000],
   light: [0, 20],
   ambient: [0, 1],
+  half: [0, 1],
 };
 
 /** The address of what is seen now. */

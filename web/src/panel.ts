@@ -25,6 +25,7 @@ const GROUPS: [string, Slider[]][] = [
       { name: "density", label: "Opacity", low: 0.02, high: 20, step: 0.01, log: true, unit: "×", hint: "Extinction γ, as a multiple of the style's own" },
       { name: "steps", label: "Steps a frame", low: 0, high: 64, step: 1, hint: "How long the rule works between two frames; 0 is as in its training" },
       { name: "detail", label: "Detail", low: 1, high: 3, step: 1, unit: "×", hint: "Parts of a cell that are drawn, as by --refine" },
+      { name: "half", label: "16-bit steps", low: 0, high: 1, step: 1, hint: "Quicker, and a little rounder" },
       { name: "seed", label: "Seed", low: 0, high: 99, step: 1, hint: "Another seed, another painting of the same style" },
     ],
   ],
@@ -60,7 +61,10 @@ export function makePanel(viewer: Viewer): HTMLElement {
   const updates: (() => void)[] = [];
   for (const [title, sliders] of GROUPS) {
     const group = element("details", { open: title !== "Guide" }, element("summary", {}, title));
-    for (const slider of sliders) group.append(makeSlider(viewer, slider, updates));
+    for (const slider of sliders) {
+      if (slider.name === "half" && !viewer.gpu.hasHalf) continue;
+      group.append(makeSlider(viewer, slider, updates));
+    }
     panel.append(group);
   }
   const update = (): void => updates.forEach((each) => each());

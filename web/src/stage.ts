@@ -38,6 +38,8 @@ export interface Settings {
   /** Parts of a cell along each axis that are drawn. */
   detail: number;
   brush: number;
+  /** 1 rounds the factors of a step to 16 bits, where the GPU has such numbers. */
+  half: number;
 }
 
 export const DEFAULTS: Readonly<Settings> = {
@@ -59,6 +61,7 @@ export const DEFAULTS: Readonly<Settings> = {
   wipe: 2,
   detail: 1,
   brush: 5,
+  half: 0,
 };
 const FIELD_OF_VIEW = 30;
 const STRIDE = 0.5; // cells of what is drawn, between samples along a ray
@@ -126,8 +129,9 @@ export class Stage {
   }
 
   /** Let a rule work as the first or the second; it begins where the smoke is. */
-  async use(rule: Rule | null, place: 0 | 1, half = false): Promise<void> {
-    const layer = rule === null ? null : await Layer.create(this.gpu, rule, this.smoke, half);
+  async use(rule: Rule | null, place: 0 | 1): Promise<void> {
+    const isHalf = this.settings.half > 0;
+    const layer = rule === null ? null : await Layer.create(this.gpu, rule, this.smoke, isHalf);
     this.layers[place]?.destroy();
     if (layer === null) {
       this.layers.length = place;

@@ -159,6 +159,7 @@ export class Viewer extends EventTarget {
   set<K extends keyof Settings>(name: K, value: Settings[K]): void {
     this.stage.settings[name] = value;
     if (TOLD.includes(name)) this.stage.conditionAgain();
+    if (name === "half") this.names.forEach((each, at) => void this.use(each, at as 0 | 1));
     this.stage.lookAgain();
     this.changed();
   }
