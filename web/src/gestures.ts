@@ -6,6 +6,7 @@ import type { Viewer } from "./viewer";
 
 const TURN = 0.35; // degrees a pixel
 const STEEPEST = 89;
+const GRIP = 12; // pixels beside the line to the plain smoke by which it is taken
 
 /** Turns a camera by so many degrees. */
 export function turn(camera: Camera, azimuth: number, elevation: number): void {
@@ -40,13 +41,21 @@ export function listen(viewer: Viewer): void {
     brushing = false;
   };
 
+  const lineAt = (event: PointerEvent): number => {
+    const { left, width } = canvas.getBoundingClientRect();
+    return (event.clientX - left) / width;
+  };
+  let isLine = false;
+
   const isBrush = (event: PointerEvent): boolean =>
     viewer.tool !== "orbit" && fingers.size === 1 && !event.shiftKey && !(event.buttons & 6);
 
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, event);
-    if (isBrush(event)) void brush(event);
+    const { wipe } = viewer.stage.settings;
+    isLine = wipe < 1 && Math.abs(lineAt(event) - wipe) * canvas.clientWidth < GRIP;
+    if (!isLine && isBrush(event)) void brush(event);
   });
   canvas.addEventListener("pointermove", (event) => {
     const before = fingers.get(event.pointerId);
@@ -55,7 +64,9 @@ export function listen(viewer: Viewer): void {
     const y = event.clientY - before.clientY;
     const other = [...fingers.values()].find((each) => each.pointerId !== event.pointerId);
     fingers.set(event.pointerId, event);
-    if (isBrush(event)) {
+    if (isLine) {
+      viewer.set("wipe", Math.min(Math.max(lineAt(event), 0.02), 0.98));
+    } else if (isBrush(event)) {
       void brush(event);
     } else if (other !== undefined) {
       const span = (from: PointerEvent): number =>
@@ -68,7 +79,10 @@ export function listen(viewer: Viewer): void {
       viewer.look((camera) => turn(camera, -TURN * x, TURN * y));
     }
   });
-  const lifted = (event: PointerEvent): void => void fingers.delete(event.pointerId);
+  const lifted = (event: PointerEvent): void => {
+    fingers.delete(event.pointerId);
+    isLine = false;
+  };
   canvas.addEventListener("pointerup", lifted);
   canvas.addEventListener("pointercancel", lifted);
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());

@@ -188,6 +188,11 @@ test("beside the plain smoke one half is white", slow, async () => {
   const { page } = still;
   await page.keyboard.press("b");
   const seen = await pixels(page);
+  await page.mouse.move(100, 40);
+  await page.mouse.down();
+  await page.mouse.move(150, 40, { steps: 2 });
+  await page.mouse.up();
+  assert.equal(await page.evaluate(() => viewer.stage.settings.wipe), 0.75);
   await page.keyboard.press("b");
   const painted = await pixels(page);
   const saturation = (from, to) => {
