@@ -5,6 +5,8 @@ import { say } from "./notice";
 import { oneLine } from "./problem";
 import type { Viewer } from "./viewer";
 
+const HOLD = 500; // ms of a finger that stays, where no browser tells of it
+
 export function makeStrip(viewer: Viewer): HTMLElement {
   const strip = element("nav", { id: "styles", "aria-label": "Styles" });
   const buttons = new Map<string, HTMLButtonElement>();
@@ -17,16 +19,32 @@ export function makeStrip(viewer: Viewer): HTMLElement {
       say(oneLine(error));
     }
   };
+  let holding = 0;
+  let wasHeld = false;
   const fill = (): void => {
     for (const rule of viewer.show.rules) {
       if (buttons.has(rule.name)) continue;
       const made = element("button", {
         type: "button",
         title: `${rule.title || rule.name}. Right click, or hold: mix it with the one that paints`,
-        onclick: (event) => void choose(rule.name, (event as MouseEvent).shiftKey),
+        onclick: (event) => {
+          if (!wasHeld) void choose(rule.name, (event as MouseEvent).shiftKey);
+          wasHeld = false;
+        },
+        onpointerdown: (event) => {
+          wasHeld = false;
+          if ((event as PointerEvent).pointerType !== "touch") return;
+          holding = window.setTimeout(() => {
+            wasHeld = true;
+            void choose(rule.name, true);
+          }, HOLD);
+        },
+        onpointerup: () => clearTimeout(holding),
+        onpointercancel: () => clearTimeout(holding),
         oncontextmenu: (event) => {
           event.preventDefault();
-          void choose(rule.name, true);
+          if (!wasHeld) void choose(rule.name, true);
+          clearTimeout(holding);
         },
       });
       if (rule.thumbnail) made.append(element("img", { src: rule.thumbnail, alt: "", draggable: "false" }));
