@@ -48,7 +48,7 @@ for (const [style, refine] of [["ink", 1], ["church", 1], ["ink", 2]]) {
     assert.equal(got.states.length, states.length);
     assert.equal(channels, 12);
     const worst = states.reduce((most, value, at) => Math.max(most, Math.abs(value - got.states[at])), 0);
-    assert.ok(worst < 1e-4, `states are ${worst} apart`);
+    assert.ok(worst < 1e-5, `states are ${worst} apart`);
     assert.ok(Math.max(...states) > 0.1);
     const pictures = floats(`${style}_${refine}.pictures`);
     const count = told.size ** 2;
