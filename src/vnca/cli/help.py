@@ -55,6 +55,7 @@ COMMON: Mapping[str, tuple[str, ...]] = {
         "device",
         "overwrite",
     ),
+    "view": ("frames", "export", "page-fps", "browser", "port", *_SMOKE),
     "bench step": ("backends", "threads", "json", "csv"),
     "bench train": ("preset", "backends", "device", "threads", "repeats", "json", "csv"),
     "bench paint": ("grid", "occupancy", "precisions", "device", "threads", "json", "csv"),

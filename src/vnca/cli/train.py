@@ -1,6 +1,8 @@
 """`vnca train FRAME STYLE --out RUN`, `vnca texture train STYLE --out RUN`, and going on."""
 
+import webbrowser
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,10 +10,10 @@ from typing import Annotated, Any
 import tyro
 
 from vnca.cli.options import chosen, is_given, parse
-from vnca.cli.terminal import Terminal
+from vnca.cli.terminal import Terminal, say
 from vnca.core.errors import OptionError
 from vnca.io import SmokeFormat
-from vnca.recipe import smoke, texture
+from vnca.recipe import smoke, texture, viewing
 from vnca.training.config import SmokeConfig, TextureConfig
 from vnca.training.presets import DEFAULT, as_toml, preset, preset_names
 
@@ -40,6 +42,8 @@ class Train(smoke.SmokeRun):
     """How smoke is read from files."""
     config: SmokeConfig = field(default_factory=SmokeConfig)
     """Hyperparameters."""
+    view: bool = False
+    """Watch the rule as it learns, with its loss curves, in a browser with WebGPU."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +108,19 @@ def run(arguments: Sequence[str]) -> None:
         _show(smoke.COMMAND, arguments, ShowPreset(preset=name, config=config))
         return
     defaults = Train(frame=_MISSING, style=_MISSING, out=_MISSING, config=config)
-    smoke.run(parse(smoke.COMMAND, Train, arguments, default=defaults), Terminal())
+    options = parse(smoke.COMMAND, Train, arguments, default=defaults)
+    with training_watched(options) if options.view else nullcontext():
+        smoke.run(options, Terminal())
+
+
+def training_watched(options: Train) -> AbstractContextManager[None]:
+    """A page on which the training can be watched while the context lasts."""
+
+    def opened(address: str) -> None:
+        say(f"the training can be watched at {address}")
+        webbrowser.open(address)
+
+    return viewing.training_watched(options.out, options.frame, options.smoke, Terminal(), opened)
 
 
 def run_texture(arguments: Sequence[str]) -> None:

@@ -1,8 +1,7 @@
 """Where an automaton is computed: sessions, which hold it there, and the backends that open them.
 
 A backend is one file or folder here, with a `BACKEND` in it, and its name in `BACKENDS`. It opens
-sessions, which hold state, neighbours, conditioning and mask where they are computed; and it
-decodes states, which is chosen together with the step.
+sessions, which hold all that a step needs where it is computed; and decodes their states.
 """
 
 import ctypes
@@ -24,12 +23,14 @@ from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.engine.automaton import Automaton, Weights
 from vnca.engine.domain import Domain
 
-BACKENDS = ("native", "triton", "numpy", "reference")
+BACKENDS = ("native", "triton", "wgsl", "numpy", "reference")
 """Names of backends, each that of its folder, the fastest on its kind of device first."""
-ON_CPU = ("native", "numpy")
-"""Those that work on the CPU alone."""
+ON_CPU = ("native", "numpy", "wgsl")
+"""Those for which torch has to find no GPU: they work on the CPU, or find one themselves."""
 PRECISIONS = ("float32", "bfloat16")
-"""What a backend may round the factors of its products to; states and sums stay float32."""
+"""What the native backend may round factors of products to; states and sums stay float32."""
+ROUNDED_BY = {"bfloat16": "native", "float16": "wgsl"}
+"""The backend that rounds to each of what is not float32."""
 
 
 @dataclass(frozen=True)
@@ -37,20 +38,19 @@ class Compute:
     """How to compute."""
 
     backend: str = "auto"
-    """auto takes the fastest that is there; native, triton, numpy or reference that one."""
+    """auto takes the fastest that is there; native, triton, wgsl, numpy or reference that one."""
     device: str = "cpu"
     """cpu, cuda, or one of several GPUs, such as cuda:1; see `device_named`."""
     precision: str = "float32"
-    """What the native backend rounds the factors of its products to; bfloat16 is quicker where the
-    processor has it."""
+    """What factors of products are rounded to: bfloat16 by native, float16 by wgsl is quicker."""
     threads: int | None = None
     """Threads of the native backend; one for each core unless given."""
 
     def __post_init__(self) -> None:
         if self.backend not in ("auto", *BACKENDS):
             raise OptionError(f"`backend` {self.backend}: expected auto, {', '.join(BACKENDS)}")
-        if self.precision not in PRECISIONS:
-            raise OptionError(f"`precision` {self.precision}: expected {' or '.join(PRECISIONS)}")
+        if self.precision not in ("float32", *ROUNDED_BY):
+            raise OptionError(f"`precision` {self.precision}: not float32, {', '.join(ROUNDED_BY)}")
         if self.threads is not None and self.threads < 1:
             raise OptionError(f"`threads` {self.threads}: at least 1 is needed")
 
@@ -218,7 +218,7 @@ class Backend(ABC):
         if differentiable and not self.has_gradients:
             return "it has no gradients; use reference"
         if compute.precision not in self.precisions:
-            return f"only the native backend has {compute.precision}; use precision float32"
+            return f"only {ROUNDED_BY[compute.precision]} has {compute.precision}; use float32"
         return self.missing(compute)
 
     @abstractmethod

@@ -339,6 +339,11 @@ def load_style(name: str) -> Model:
         return Model.load(path)
 
 
+def style_bytes(name: str) -> bytes:
+    """The model file of a style."""
+    return _FOLDER.joinpath(name + SUFFIX).read_bytes()
+
+
 def style_thumbnail(name: str) -> bytes:
     """A picture of smoke painted in a style, the bytes of a WebP file."""
     return _FOLDER.joinpath(name + THUMBNAIL).read_bytes()

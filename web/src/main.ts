@@ -1,0 +1,67 @@
+// The page: reads what it is to show, opens the GPU, and puts its parts on the screen.
+
+import { element } from "./dom";
+import { listen } from "./gestures";
+import { listenToKeys } from "./keys";
+import { restore } from "./link";
+import { say, stop, WHERE } from "./notice";
+import { makePanel } from "./panel";
+import { oneLine } from "./problem";
+import { watchRun } from "./run";
+import { readShow } from "./show";
+import { makeStrip } from "./strip";
+import { makeTools } from "./tools";
+import { makeTransport } from "./transport";
+import { Viewer } from "./viewer";
+
+const canvas = document.getElementById("canvas") as HTMLCanvasElement;
+
+async function begin(): Promise<void> {
+  const show = await readShow();
+  document.title = `${show.title} · vnca`;
+  const viewer = await Viewer.open(canvas, show);
+  Object.assign(viewer.stage.settings, known(show.settings, viewer));
+  // For tests, and for whoever likes to try things from the browser's console.
+  Object.assign(globalThis, { viewer });
+  await restore(viewer, location.hash);
+  window.addEventListener("hashchange", () => void restore(viewer, location.hash));
+  build(viewer);
+  document.body.classList.add("ready");
+  if (show.run) watchRun(viewer);
+  else if (!location.hash) await viewer.play();
+}
+
+function known(settings: Record<string, number>, viewer: Viewer): Record<string, number> {
+  return Object.fromEntries(Object.entries(settings).filter(([name]) => name in viewer.stage.settings));
+}
+
+function build(viewer: Viewer): void {
+  const painted = element("span", { id: "painted" });
+  const update = (): void => {
+    const [first, second] = viewer.names.map((name) => name.replaceAll("_", " "));
+    painted.textContent = second ? `${first} and ${second}` : first;
+  };
+  viewer.addEventListener("rules", update);
+  update();
+  if (window.innerWidth < 720) document.body.classList.add("bare");
+  document.body.append(
+    element("header", {}, element("h1", {}, viewer.smoke.name), painted),
+    makeTools(viewer),
+    makePanel(viewer),
+    element("footer", {}, makeStrip(viewer), makeTransport(viewer)),
+  );
+  listen(viewer);
+  listenToKeys(viewer);
+  document.addEventListener("dragover", (event) => event.preventDefault());
+  document.addEventListener("drop", (event) => {
+    event.preventDefault();
+    const file = event.dataTransfer?.files[0];
+    if (file) viewer.add(file).catch((error: unknown) => say(oneLine(error)));
+  });
+}
+
+begin().catch((error: unknown) => {
+  const line = oneLine(error);
+  const isGpu = /WebGPU/.test(line);
+  stop(isGpu ? "No WebGPU here" : "This cannot be shown", isGpu ? `${line} ${WHERE}` : line);
+});
