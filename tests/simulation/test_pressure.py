@@ -6,7 +6,7 @@ from vnca.simulation import Smoke, project
 from vnca.simulation.pressure import ALL_OPEN, CEILING, Open, Pressure
 
 SHAPE = (12, 10, 14)
-WALLS: Open = ((False, False),) * 3
+WALLS: Open = ((False, False), (False, False), (False, False))
 MIXED: Open = ((True, True), (False, True), (False, False))
 
 

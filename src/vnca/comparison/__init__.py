@@ -18,6 +18,7 @@ from vnca.core.errors import FileFormatError, OptionError
 from vnca.core.files import existing_file, whole_file, writable_folder
 from vnca.io import SmokeFormat
 from vnca.io.picture import read_style, write_image
+from vnca.io.sequence import FrameSequence
 from vnca.peers.gram import grey_picture
 from vnca.peers.methods import METHODS, method_named
 from vnca.recipe import Watch, peers, recorded
@@ -104,10 +105,11 @@ class Contender:
     peak_mb: float | None = None
 
 
-def contenders(options: CompareRun, watch: Watch) -> list[Contender]:
+def contenders(options: CompareRun, sequence: FrameSequence, watch: Watch) -> list[Contender]:
     """Paint what is not painted yet, one method after the other.
 
-    A method that an earlier call finished with the same options is not run again.
+    A method that an earlier call finished with the same options, on the same files, is not run
+    again.
 
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
@@ -116,15 +118,15 @@ def contenders(options: CompareRun, watch: Watch) -> list[Contender]:
     picture = read_style(options.picture)
     light = srgb_to_linear(grey_picture(picture)).astype(np.float32)
     write_image(out / PICTURE, np.repeat(light[..., None], 3, axis=-1))
-    return [_contender(method, options, watch) for method in options.methods]
+    asked = _asked(options, sequence)
+    return [_contender(method, options, asked, watch) for method in options.methods]
 
 
-def _contender(method: str, options: CompareRun, watch: Watch) -> Contender:
+def _contender(method: str, options: CompareRun, asked: dict[str, Any], watch: Watch) -> Contender:
     name, given, folder = method.partition("=")
     if given:
         return _given(name, Path(folder))
     home = options.out / name
-    asked = _asked(options)
     done = _finished(home, asked)
     if done is None:
         watch.note(f"{name}: painting")
@@ -149,11 +151,13 @@ def _given(name: str, folder: Path) -> Contender:
     return Contender(name, folder, True, told.get("seconds_per_frame"), None, told.get("peak_mb"))
 
 
-def _asked(options: CompareRun) -> dict[str, Any]:
+def _asked(options: CompareRun, sequence: FrameSequence) -> dict[str, Any]:
     """What has to be the same for a painting not to be made again, as JSON values."""
     asked = recorded(options)
     for name in ("out", "methods", "size", "study"):
         del asked[name]
+    files = [(path.name, path.stat()) for path in (options.picture, *(f.path for f in sequence))]
+    asked["files"] = [[name, status.st_size, status.st_mtime_ns] for name, status in files]
     return json.loads(json.dumps({**asked, "vnca": vnca.__version__}))
 
 

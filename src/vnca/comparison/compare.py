@@ -36,7 +36,7 @@ def run(options: CompareRun, watch: Watch) -> list[Result]:
     sequence = open_sequence(options.sequence, options.frames, watch)
     smoke = with_fitted_scale(options.smoke, sequence)
     region = sequence_region(sequence, smoke, watch)
-    found = contenders(options, watch)
+    found = contenders(options, sequence, watch)
     given = list(volumes(sequence, smoke, region.lattice))
     picture = read_image(out / PICTURE)
     judged = bench(given, region, picture, smoke, options.size, watch)

@@ -28,7 +28,7 @@ QUESTIONS: Mapping[str, str] = {
     "motion": "Which video is most plausible as a natural smoke sequence?",
 }
 """As the paper asked them; the first of pictures, the others of films."""
-FORMAT = "vnca-study-1"
+FORMAT = "smoke-study-1"
 _Z = 1.959964  # two-sided 95 %
 
 
@@ -147,7 +147,10 @@ def wilson(chosen: int, asked: int) -> tuple[float, float]:
     middle = share + z * z / (2 * asked)
     reach = z * math.sqrt(share * (1 - share) / asked + z * z / (4 * asked * asked))
     scale = 1 + z * z / asked
-    return max(0.0, (middle - reach) / scale), min(1.0, (middle + reach) / scale)
+    # Not by rounding short of where it ends exactly.
+    low = (middle - reach) / scale if chosen else 0.0
+    high = (middle + reach) / scale if chosen < asked else 1.0
+    return low, high
 
 
 def _read(

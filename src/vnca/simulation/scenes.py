@@ -148,9 +148,9 @@ def _sphere(stage: Stage, frame: int) -> None:
     """A hot ball under a solid one."""
     heat = stage.noise("heat", size=0.05, memory=0.9)
     ball = np.sqrt(stage.x**2 + stage.y**2 + (stage.z - 0.2) ** 2)
-    where = _soft(ball - 0.13, 0.02)
+    where = _soft(ball - 0.125, 0.02)
     stage.emit_density(where, 0.95 + 0.05 * heat)
-    stage.emit_velocity(where, 0, 0, 0.035 + 0.004 * heat)
+    stage.emit_velocity(where, 0, 0, 0.056 + 0.006 * heat)
 
 
 def _bunny(stage: Stage, frame: int) -> None:
@@ -167,13 +167,14 @@ def _billowy(stage: Stage, frame: int) -> None:
     grain = stage.noise("grain", size=0.025, memory=0.8)
     where = _soft(np.maximum(np.hypot(stage.x, stage.y) - 0.28, stage.z - 0.07), 0.03)
     spots: FloatArray = np.clip(0.6 + 0.5 * heat, 0, 1).astype(np.float32)
-    where = where * spots
+    where = (where * spots).astype(np.float32)
     stage.emit_density(where, 0.85 + 0.2 * grain)
-    stage.emit_velocity(where, 0, 0, 0.03 + 0.02 * heat + 0.01 * grain)
+    speed = (0.03 + 0.02 * heat + 0.01 * grain).astype(np.float32)
+    stage.emit_velocity(where, 0, 0, speed)
 
 
 def _ball(stage: Stage) -> BoolArray:
-    return np.sqrt(stage.x**2 + stage.y**2 + (stage.z - 0.85) ** 2) < 0.18
+    return np.sqrt(stage.x**2 + stage.y**2 + (stage.z - 0.72) ** 2) < 0.1
 
 
 @dataclass(frozen=True)
