@@ -9,7 +9,7 @@ Vnca = Callable[..., Any]
 QUICK = ("--iterations", 1, "--features", "efficientnet")
 
 
-def test_two_folders_are_compared_and_what_is_painted_is_not_painted_again(
+def test_two_folders_are_compared(
     vnca: Vnca, made_smoke: Path, style: Path, tmp_path: Path
 ) -> None:
     for name in ("one", "two"):

@@ -34,7 +34,7 @@ def test_the_jet_is_the_papers() -> None:
 def test_smoke_goes_around_the_sphere() -> None:
     (*_, last) = simulate("sphere", resolution=20, frames=45, seed=0)
     x, y, z = ((np.arange(n) + 0.5) / 20 for n in last.density.shape)
-    ball = (x[:, None, None] - 0.5) ** 2 + (y[:, None] - 0.5) ** 2 + (z - 0.72) ** 2 < 0.09**2
+    ball = (x[:, None, None] - 0.5) ** 2 + (y[:, None] - 0.5) ** 2 + (z - 0.72) ** 2 < 0.11**2
     assert ball.any()
     assert not last.density[ball].any()
     assert last.density[..., 18:].sum() > 20

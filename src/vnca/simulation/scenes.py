@@ -150,7 +150,7 @@ def _sphere(stage: Stage, frame: int) -> None:
     ball = np.sqrt(stage.x**2 + stage.y**2 + (stage.z - 0.2) ** 2)
     where = _soft(ball - 0.125, 0.02)
     stage.emit_density(where, 0.95 + 0.05 * heat)
-    stage.emit_velocity(where, 0, 0, 0.056 + 0.006 * heat)
+    stage.emit_velocity(where, 0, 0, 0.046 + 0.005 * heat)
 
 
 def _bunny(stage: Stage, frame: int) -> None:
@@ -174,7 +174,7 @@ def _billowy(stage: Stage, frame: int) -> None:
 
 
 def _ball(stage: Stage) -> BoolArray:
-    return np.sqrt(stage.x**2 + stage.y**2 + (stage.z - 0.72) ** 2) < 0.1
+    return np.sqrt(stage.x**2 + stage.y**2 + (stage.z - 0.72) ** 2) < 0.12
 
 
 @dataclass(frozen=True)
