@@ -197,7 +197,7 @@ def _written(
         colour=white,
         box=box,
         lattice=region.lattice,
-        spread=SPREAD,
+        beyond=SPREAD,
         provenance=dataclasses.replace(told, up_axis=up_axis_of(frame.path, smoke)),
     )
     return path
