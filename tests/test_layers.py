@@ -17,8 +17,10 @@ RANKS = {
     "meshes": 5,
     "training": 6,
     "metrics": 7, "bench": 7, "viewer": 7,
+    "peers": 7,
     "recipe": 8,
-    "cli": 9, "__main__": 10,
+    "comparison": 9,
+    "cli": 10, "__main__": 11,
 }  # fmt: skip
 WITHOUT_TORCH = {"core", "rule", "io", "simulation", "painting"}
 BACKENDS_WITH_TORCH = (

@@ -35,3 +35,26 @@ def test_same_seed_same_files(vnca: Vnca, tmp_path: Path) -> None:
     a, b, c = ((tmp_path / n / "jets_0002.vdb").read_bytes() for n in "abc")
     assert a == b
     assert a != c
+
+
+def test_the_papers_jet_at_a_resolution_of_ones_own(vnca: Vnca, tmp_path: Path) -> None:
+    call = ("simulate", "jet", "--preset", "paper", "-o", tmp_path, "--resolution", 16)
+    outcome = vnca(*call, "--frames", 2)
+    assert outcome.code == 0, outcome.err
+    assert len(list(tmp_path.glob("jet_*.vdb"))) == 2
+    assert "--preset" in vnca("simulate", "plume", "--preset", "paper", "-o", tmp_path).complaint
+
+
+def test_smoke_around_a_mesh_of_the_users(vnca: Vnca, tmp_path: Path) -> None:
+    mesh = tmp_path / "pyramid.obj"
+    mesh.write_text(
+        "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nv 0.5 1 0.5\n"
+        "f 1 2 3\nf 1 3 4\nf 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\n"
+    )
+    call = ("simulate", "bunny", "-o", tmp_path / "smoke", "--resolution", 16, "--frames", 2)
+    assert "--mesh" in vnca(*call).complaint
+    outcome = vnca(*call, "--mesh", mesh)
+    assert outcome.code == 0, outcome.err
+    smoke = read_smoke(tmp_path / "smoke" / "bunny_0002.vdb", SmokeFormat())
+    assert smoke.density.sum() > 0
+    assert "nowhere.obj" in vnca(*call, "--mesh", tmp_path / "nowhere.obj").complaint

@@ -20,6 +20,8 @@ COMMANDS = {
     "texture": "grow solid textures and put them on meshes",
     "evaluate": "measure how well a rule paints a sequence, in a report",
     "ablate": "train without parts of the method, and measure what these do",
+    "compare": "paint the same smoke with several methods, and judge them alike",
+    "peers": "stylize smoke with other published methods, to compare with",
     "render": "make a film or a turntable of a sequence",
     "view": "watch rules paint, live in a browser",
     "bench": "time steps, training and painting on this machine",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -31,8 +31,14 @@ from vnca.training.presets import DEFAULT, preset
 class Simulate(SimulateRun):
     """Write a smoke simulation: density and velocity (cells/frame), an OpenVDB file a frame."""
 
-    scene: Annotated[tyro.conf.Positional[Scene], tyro.conf.arg(metavar="{plume,jets,ring}")]
-    """A rising plume, two colliding jets, or a rising vortex ring."""
+    scene: Annotated[
+        tyro.conf.Positional[Scene],
+        tyro.conf.arg(metavar="{plume,jets,ring,jet,sphere,billowy,bunny}"),
+    ]
+    """A rising plume, two colliding jets, a rising vortex ring; the paper's jet, a plume against a
+    sphere, billowy smoke, or smoke around a mesh (bunny)."""
+    preset: Annotated[Literal["paper"] | None, tyro.conf.arg(metavar="paper")] = None
+    """The jet as the paper has it: 200 cells across, 300 high, 120 frames."""
     out: Path
     """Folder for the frames, named SCENE_0001.vdb and on."""
 

@@ -29,6 +29,8 @@ ASKED = ("-h", "--help", "--help-all")
 """What asks for help."""
 _SMOKE = ("velocity-units", "fps", "up-axis")
 _FILM = ("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background", "light")
+_PEER = ("out", "frames", "features", "overwrite", *_SMOKE)
+_PEERS = ("iterations", "gamma", "enlarged", "whole-picture", "seed")
 COMMON: Mapping[str, tuple[str, ...]] = {
     "paint": (
         *("out", "style", "preset", "training-frame", "frames", "refine", "strength", "seed"),
@@ -44,6 +46,14 @@ COMMON: Mapping[str, tuple[str, ...]] = {
     ),
     "evaluate": ("out", "frames", "refine", "style", "size", "device", "json"),
     "ablate": ("out", "preset", "seeds", "iterations", "json", "device", *_SMOKE),
+    "compare": ("out", "methods", "frames", "preset", "size", "study", "seed", *_SMOKE),
+    "peers run": _PEER,
+    "peers run aurand": (*_PEER, *_PEERS, "changes", "octaves", "rate", "cap", "alpha"),
+    "peers run aurand-forward": (*_PEER, *_PEERS, "changes", "rate", "patch", "views"),
+    "peers run lnst": (*_PEER, *_PEERS, "rate", "smoothing", "spreading", "as-published"),
+    "peers run tnst": (
+        *(*_PEER, *_PEERS, "potential", "octaves", "rate", "views", "window", "as-published"),
+    ),
     "render": (*("out", "frames", "turntable", "strip", "transparent", "gamma", "device", *_FILM),),
     "texture train": (
         "out",

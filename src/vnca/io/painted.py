@@ -58,6 +58,7 @@ def write_painted(
     lattice: Lattice | None = None,
     colour_grids: Sequence[str] = COLOUR_GRIDS,
     refine: int = 1,
+    beyond: int = 0,
     provenance: Provenance | None = None,
     file: VdbFile | None = None,
 ) -> None:
@@ -82,6 +83,7 @@ def write_painted(
             unless given.
         colour_grids: Names of the colour grids, several to have the colour several times.
         refine: How many times as fine as the source's the painted cells are along each axis.
+        beyond: How many of the painted cells around those of the source there may be smoke.
         provenance: What the file's metadata is to tell of the painting.
         file: The source itself, if it is a VDB file and open already.
 
@@ -105,7 +107,7 @@ def write_painted(
         density = Field.from_dense(density, box.lower)
     if not isinstance(colour, Field):
         colour = Field.from_dense(colour, box.lower)
-    frame = _Painting(density, colour, lattice, up_axis_of(source, format), refine)
+    frame = _Painting(density, colour, lattice, up_axis_of(source, format), refine, beyond)
     told = provenance.metadata if provenance else {}
     if source.suffix.lower() != ".vdb":
         _paint_other(path, source, format, frame, colour_grids, told)
@@ -189,6 +191,7 @@ class _Painting:
         lattice: None for those of the source, along our axes.
         up: Which axis of the source's world points up.
         refine: How fine they are.
+        beyond: How many cells around those of the source there may be smoke.
     """
 
     density: Field
@@ -196,6 +199,7 @@ class _Painting:
     lattice: Lattice | None
     up: UpAxis
     refine: int
+    beyond: int
 
     def in_file(self, transform: Transform, density: Field, what: str) -> tuple[Field, Field]:
         """Density and colour of the file's cells, or as fine ones.
@@ -231,9 +235,11 @@ class _Painting:
 
     def active(self, density: Field, of_file: Field, background: AnyArray | float = 0) -> Field:
         """Which cells to store; `of_file` are active in the file."""
-        if self.refine == 1:
+        if self.refine == 1 and not self.beyond:
             return of_file
         dense = replace(density, values=density.values != 0, outside=False).trimmed()
+        if self.refine == 1:
+            return of_file.union(dense)
         # A cell that is not stored would not be empty.
         return dense.union(divided(of_file, self.refine)) if background else dense
 
@@ -277,7 +283,7 @@ def _paint_vdb(
         return
     header, old, cells = read_density(file, format)
     what = f"{file.path}: grid {header.name!r}"
-    before, active = old.fields(cells)
+    before, active = old.fields(cells.grown(frame.beyond))
     density, colour = frame.in_file(old.transform, before, what)
     background = old.tree.background
     active = frame.active(density, active, background)
@@ -322,7 +328,7 @@ def _paint_other(
 ) -> None:
     stored = reader_of(Path(source)).read(Path(source), format)
     transform = Transform.from_matrix(stored.index_to_world)
-    before = stored.density
+    before = stored.density.within(stored.density.box.grown(frame.beyond))
     density, colour = frame.in_file(transform, before, str(source))
     active = frame.active(density, replace(before, values=before.values != 0, outside=False))
     colour, coloured = _with_rim(colour, active)
