@@ -16,8 +16,8 @@ import numpy as np
 
 from vnca.core import FloatArray, IntArray
 from vnca.core.errors import BackendUnavailableError, OptionError, ShapeError
-from vnca.engine import PRECISIONS, ArrayDecode, Backend, Compute, Job, Session, StepSession
-from vnca.engine.automaton import OUTPUTS, DecoderWeights, Weights, mask_key, mask_threshold
+from vnca.engine import PRECISIONS, ArrayDecode, Backend, Compute, Job, Session
+from vnca.engine.automaton import OUTPUTS, DecoderWeights, mask_key, mask_threshold
 
 try:
     import vnca.engine.native._native as _native  # pyright: ignore[reportMissingModuleSource]
@@ -325,10 +325,11 @@ class NativeBackend(Backend):
 
     def session(self, job: Job) -> Session:
         """See `Backend.session`."""
-        options = {"threads": job.compute.threads, "precision": job.compute.precision}
         if not job.differentiable:
-            update = partial(_update, **options)
-            return StepSession.open(job, draw=changing_rows, update=update)
+            from vnca.engine.native.bricks import BrickSession
+
+            return BrickSession.open(job)
+        options = {"threads": job.compute.threads, "precision": job.compute.precision}
         from vnca.engine.native.autograd import changing_tensor_rows
         from vnca.engine.tensors import tensor_session
 
@@ -349,13 +350,6 @@ class NativeBackend(Backend):
     def array_decode(self, *, threads: int | None = None) -> ArrayDecode:
         """See `Backend.array_decode`."""
         return ArrayDecode(partial(decode, threads=threads), partial(decode_cells, threads=threads))
-
-
-def _update(*arrays: Any, **options: Any) -> FloatArray:
-    """The step on arrays, called as that of the reference is."""
-    state, rows, neighbours, conditioning, weights, stencil = arrays
-    assert isinstance(weights, Weights)
-    return forward(state, rows, neighbours, conditioning, *weights, stencil, **options)
 
 
 BACKEND = NativeBackend()

@@ -19,6 +19,25 @@ def forward(
     instructions: str,
     /,
 ) -> None: ...
+def forward_bricks(
+    state: FloatArray,
+    around: IntArray,
+    places: IntArray,
+    hashes: IntArray,
+    key: int,
+    threshold: int,
+    all: bool,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    out: FloatArray,
+    threads: int,
+    bfloat16: bool,
+    instructions: str,
+    /,
+) -> None: ...
 def backward(
     state: FloatArray,
     rows: IntArray,

@@ -42,6 +42,20 @@ typedef float Vec __attribute__((vector_size(LANES * sizeof(float))));
 INLINE Vec load(const float* from) { return load_as<Vec>(from); }
 INLINE void store(float* to, Vec v) { std::memcpy(to, &v, sizeof v); }
 
+// Adds the first `count` floats of a vector to what there is.
+INLINE void add_first(float* to, Vec v, int count) {
+    if (count >= LANES) return store(to, load(to) + v);
+    typedef float Four __attribute__((vector_size(4 * sizeof(float))));
+    float values[LANES];
+    store(values, v);
+    int c = 0;
+    for (; c + 4 <= count; c += 4) {
+        const Four sum = load_as<Four>(to + c) + load_as<Four>(values + c);
+        std::memcpy(to + c, &sum, sizeof sum);
+    }
+    for (; c < count; ++c) to[c] += values[c];
+}
+
 constexpr std::size_t round_up(std::size_t x, std::size_t to) { return (x + to - 1) / to * to; }
 
 // Products multiply numbers, float or bfloat16, and sum up floats. DEPTH numbers that follow one
