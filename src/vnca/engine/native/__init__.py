@@ -14,7 +14,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from vnca.core import FloatArray, IntArray
+from vnca.core import AnyArray, FloatArray, IntArray
 from vnca.core.errors import BackendUnavailableError, OptionError, ShapeError
 from vnca.engine import PRECISIONS, ArrayDecode, Backend, Compute, Job, Session
 from vnca.engine.automaton import OUTPUTS, DecoderWeights, mask_key, mask_threshold
@@ -197,6 +197,42 @@ def checked(operation: str, function: Callable[P, T], *args: P.args, **kwargs: P
             f"{operation}: expected arrays of float32 or int32 in this machine's byte order, those "
             "to be written to writable, and at most 2³¹ threads"
         ) from None
+
+
+def fill(values: FloatArray, known: AnyArray, cells: AnyArray, beside: AnyArray) -> None:
+    """Give cells the mean of those of their six neighbours that are known.
+
+    Args:
+        values: `[512 (m + 1), 3]` in m bricks of 8³, laid out flat, and in one that is not there.
+        known: `[512 (m + 1)]`, which of them are.
+        cells: `[k]` places of cells that are not and have a neighbour that is, int64, each once.
+        beside: `[6, m]` first places of the bricks beside each, int64, by `core.marks.WAYS`.
+
+    Raises:
+        BackendUnavailableError: If the extension was not built.
+        ShapeError: If arrays are of other shapes or types, or hold places out of range.
+    """
+    arrays = (values, known.view(np.uint8), cells, beside)
+    checked("continuing values", extension().fill, *arrays, default_threads())
+
+
+def multiply_adds(rounds: int, *, precision: str = "float32", threads: int | None = None) -> float:
+    """Multiply-adds of numbers that stay in registers: what a step could do at most.
+
+    Args:
+        rounds: As many times a few, in each thread.
+        precision: Of what is multiplied.
+        threads: How many; by default one for each core.
+
+    Returns:
+        How many operations were done, two for each.
+
+    Raises:
+        BackendUnavailableError: If the extension was not built, or this machine has no bfloat16.
+        OptionError: If there is no precision of that name.
+    """
+    how = (threads or default_threads(), precision == "bfloat16")
+    return extension(precision).multiply_adds(rounds, *how)
 
 
 _OPERATION = "decoding"

@@ -1,8 +1,17 @@
 from collections.abc import Sequence
 
-from vnca.core import FloatArray, IntArray
+from vnca.core import AnyArray, FloatArray, IntArray
 
 def instructions(bfloat16: bool, /) -> list[str]: ...
+def multiply_adds(rounds: int, threads: int, bfloat16: bool, /) -> float: ...
+def fill(
+    values: FloatArray,
+    known: AnyArray,
+    cells: AnyArray,
+    beside: AnyArray,
+    threads: int,
+    /,
+) -> None: ...
 def changing_rows(hashes: IntArray, key: int, threshold: int, rows: IntArray, /) -> int: ...
 def forward(
     state: FloatArray,

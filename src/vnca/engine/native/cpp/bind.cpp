@@ -5,6 +5,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -12,8 +13,10 @@
 
 #include "arrays.hpp"
 #include "bind_decode.hpp"
+#include "fill.hpp"
 #include "mask.hpp"
 #include "step.hpp"
+#include "thread_pool.hpp"
 
 using namespace vnca;
 
@@ -128,6 +131,33 @@ NB_MODULE(_native, m) {
         std::vector<std::string> names;
         for (const Kernel* const kernel : kernels_for(bfloat16)) names.emplace_back(kernel->name);
         return names;
+    });
+
+    m.def("multiply_adds", [](std::int64_t rounds, int threads, bool bfloat16) {
+        const Kernel& kernel = kernel_named("", bfloat16);
+        std::atomic<double> operations = 0;
+        nb::gil_scoped_release released;
+        ThreadPool::of_process().run(threads, threads, [&](int, int) {
+            operations += kernel.multiply_adds(rounds);
+        });
+        return operations.load();
+    });
+
+    m.def("fill", [](Output values, Input known, Input cells, Input beside, int threads) {
+        const std::int64_t bricks = length(beside, 1), count = length(cells, 0);
+        const std::int64_t places = (bricks + 1) * Filling::BRICK;
+        const Filling filling = {
+            bricks, data_of<float>(values, "values", {places, 3}),
+            data_of<std::uint8_t>(known, "known", {places}),
+            data_of<std::int64_t>(beside, "bricks beside", {Filling::WAYS, bricks})};
+        const auto* const to_fill = data_of<std::int64_t>(cells, "cells", {count});
+        check_apart({values}, {known, cells, beside});
+        bool valid;
+        {
+            nb::gil_scoped_release released;
+            valid = fill(filling, to_fill, count, threads);
+        }
+        if (!valid) throw nb::value_error("cells: expected places of unknown cells, and of bricks");
     });
 
     m.def("changing_rows", [](Input hashes, std::uint32_t key, std::uint32_t threshold, Output rows) {

@@ -303,12 +303,24 @@ void backward(const Step& s, const float* packed, const Block& block, const floa
             });
 }
 
+double multiply_adds(std::int64_t rounds) {
+    constexpr int CHAINS = REGISTERS == 32 ? 24 : 12;  // more than wait for one another
+    Vec sum[CHAINS] = {};
+    const Units half = (Units)(Vec{} + 0.5f);
+    for (std::int64_t round = 0; round < rounds; ++round)
+#pragma GCC unroll 24
+        for (int i = 0; i < CHAINS; ++i) sum[i] = chained(sum[i], half);
+    volatile float seen = 0;  // or nothing would have to be computed
+    for (const Vec& each : sum) seen = seen + each[0];
+    return 2.0 * double(rounds) * CHAINS * LANES * DEPTH;
+}
+
 #define TEXT(x) #x
 #define NAME(x) TEXT(x)
 
 }  // namespace
 
 extern const Kernel kernel = {NAME(VNCA_TARGET), DEPTH > 1, sizes, pack, forward, forward_bricks,
-                             backward};
+                             backward, multiply_adds};
 
 }  // namespace vnca::VNCA_TARGET

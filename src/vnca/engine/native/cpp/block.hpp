@@ -75,6 +75,10 @@ struct Kernel {
     // block's slots) that of the cells' neighbourhoods.
     void (*backward)(const Step&, const float* packed, const Block&, const float* gradient,
                      float* scratch, float* weights, float* state);
+
+    // Nothing but multiply-adds of what is in registers; returns how many operations these were,
+    // two for each: what there is to be had.
+    double (*multiply_adds)(std::int64_t rounds);
 };
 
 // One for each instruction set that this build knows, fastest first.

@@ -85,6 +85,11 @@ INLINE Vec multiply_add(Unit a, Units b, Vec sum) {
     return (Vec)_mm512_dpbf16_ps((__m512)sum, (__m512bh)(a + Units{}), (__m512bh)b);
 }
 
+// A multiply-add that waits for the one before it, and of which nothing can be done beforehand.
+INLINE Vec chained(Vec sum, Units by) {
+    return (Vec)_mm512_dpbf16_ps((__m512)sum, (__m512bh)by, (__m512bh)by);
+}
+
 // Numbers in rows, `count` of them in use, put into `room` as units across the rows, for products
 // along them. A row of units takes DEPTH strides.
 INLINE const Unit* interleave(const Unit* rows, std::size_t stride, int count, int width,
@@ -108,6 +113,7 @@ INLINE Number number(float x) { return x; }
 INLINE void put(Number* to, Vec v) { store(to, v); }
 INLINE Vec get(const Number* from) { return load(from); }
 INLINE Vec multiply_add(Unit a, Units b, Vec sum) { return a * b + sum; }
+INLINE Vec chained(Vec sum, Units by) { return sum * by + by; }
 
 // Units of one number are across the rows as they are along them.
 INLINE const Unit* interleave(const Unit* rows, std::size_t, int, int, Unit*) { return rows; }
