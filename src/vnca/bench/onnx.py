@@ -64,13 +64,13 @@ def onnx_step(
         node("Mul", ["mask", "change"], ["masked"]),
         node("Add", ["state", "masked"], ["after"]),
     ]
-    ends = [
+    before, after = (
         [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape)]
         for name in ("state", "after")
-    ]
+    )
     constants = [numpy_helper.from_array(array, name) for name, array in given.items()]
     model = helper.make_model(
-        helper.make_graph(nodes, "step", *ends, constants),
+        helper.make_graph(nodes, "step", before, after, constants),
         opset_imports=[helper.make_opsetid("", OPSET)],
         ir_version=IR_VERSION,
     )
@@ -79,4 +79,4 @@ def onnx_step(
     session = onnxruntime.InferenceSession(
         model.SerializeToString(), options, providers=["CPUExecutionProvider"]
     )
-    return lambda state: session.run(["after"], {"state": state})[0]
+    return lambda state: np.asarray(session.run(["after"], {"state": state})[0])

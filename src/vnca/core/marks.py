@@ -39,7 +39,9 @@ class Marks:
     def __init__(self, bricks: IntArray) -> None:
         """For bricks `[m, 3]`, sorted, each once."""
         places, one = Places(bricks), np.eye(3, dtype=np.int32)
-        self.rows_beside = {way: places.find(bricks + way[1] * one[way[0]]) for way in WAYS}
+        self.rows_beside: dict[tuple[int, int], AnyArray] = {
+            way: places.find(bricks + way[1] * one[way[0]]) for way in WAYS
+        }
 
     def next_to(self, bits: AnyArray, axis: int) -> AnyArray:
         """Where the next cell along an axis, up or down, is marked: `[m, 8]` bits."""
