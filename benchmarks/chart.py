@@ -10,6 +10,7 @@ LEFT, RIGHT, TOP, BOTTOM = 64, 36, 56, 48
 COLOURS = {
     "plain": "#7f7f7f",
     "compile": "#bcbd22",
+    "onnx": "#9467bd",
     "reference": "#1f77b4",
     "native": "#d62728",
     "triton": "#2ca02c",

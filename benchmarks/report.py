@@ -14,7 +14,7 @@ from pathlib import Path
 
 from chart import COLOURS, Chart, around, page
 from vnca.bench.contenders import DTYPES, PROBABILITY
-from vnca.bench.step import needed_bytes, needed_flop
+from vnca.bench.step import PEAKS, needed_bytes, needed_flop
 
 ROOT = Path(__file__).parents[1]
 Row = dict[str, str]
@@ -62,10 +62,10 @@ def roofline(rows: Sequence[Row]) -> list[Chart]:
     for runs in grouped(rows, "device", "threads", "dtype").values():
         run = max(latest(runs, STEP_CASE), key=lambda found: cells(found[0]))
         first = run[0]
-        gemm, copy = float(first["gemm_gflops"]), float(first["copy_gbs"])
-        ridge = gemm / copy
+        peak, copy = float(first["peak_gflops"]), float(first["copy_gbs"])
+        ridge = peak / copy
         left, right = around([ridge / 10, ridge * 10, *map(intensity, run)])
-        low, high = around([*(float(row["gflops"]) for row in run), gemm])
+        low, high = around([*(float(row["gflops"]) for row in run), peak])
         low = min(low, left * copy)
         chart = Chart(
             f"{first['device']}, {first['dtype']}",
@@ -77,15 +77,16 @@ def roofline(rows: Sequence[Row]) -> list[Chart]:
             ("FLOP a byte that must be moved", left, right),
             ("GFLOP/s", low, high),
         )
-        chart.line([(left, left * copy), (ridge, gemm), (right, gemm)], "#222")
-        chart.text((right, gemm), f"GEMM {gemm:,.0f} GFLOP/s", anchor="end", up=10)
+        chart.line([(left, left * copy), (ridge, peak), (right, peak)], "#222")
+        what = PEAKS[first["peak_of"]]
+        chart.text((right, peak), f"{what} {peak:,.0f} GFLOP/s", anchor="end", up=10)
         slope = (left * ridge) ** 0.5
         chart.text((slope, slope * copy), f"copy {copy:,.0f} GB/s", up=-6)
         for row in run:
             at = intensity(row), float(row["gflops"])
             chart.dot(at, COLOURS[row["backend"]], hollow=row["pass"] != "forward")
             if row["pass"] == "forward":
-                chart.text(at, f"{row['backend']} {float(row['share_of_gemm']):.1%}", anchor="end")
+                chart.text(at, f"{row['backend']} {float(row['share_of_peak']):.1%}", anchor="end")
         charts.append(chart)
     return charts
 
@@ -135,10 +136,11 @@ def step_table(rows: Sequence[Row]) -> list[str]:
         lines += [
             f"**{first['grid']} cells, {float(first['occupancy']):.0%} alive, hidden "
             f"{first['hidden']}, {first['dtype']}**: {first['device']}, {first['threads']} "
-            f"threads, torch {first['torch']}; GEMM {first['gemm_gflops']} GFLOP/s, copy "
+            f"threads, torch {first['torch']}; {PEAKS[first['peak_of']]} "
+            f"{first['peak_gflops']} GFLOP/s, copy "
             f"{first['copy_gbs']} GB/s ({first['date']})",
             "",
-            "| backend | pass | ns an active cell | of GEMM | of copy | MB | against `plain` |",
+            "| backend | pass | ns an active cell | of peak | of copy | MB | against `plain` |",
             "|---|---|---|---|---|---|---|",
         ]
         for row in run:
@@ -146,7 +148,7 @@ def step_table(rows: Sequence[Row]) -> list[str]:
             gain = f"{plain[row['pass']] / took:.1f}×" if row["pass"] in plain else ""
             lines.append(
                 f"| {row['backend']} | {row['pass']} | {took:.4g} | "
-                f"{float(row['share_of_gemm']):.1%} | {float(row['share_of_copy']):.1%} | "
+                f"{float(row['share_of_peak']):.1%} | {float(row['share_of_copy']):.1%} | "
                 f"{row['peak_mb']} | {gain} |"
             )
         lines.append("")

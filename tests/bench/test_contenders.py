@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from vnca.bench.contenders import Case, Place, PlainUpdate
+from vnca.bench.contenders import Case, Place
+from vnca.bench.plain import PlainUpdate
 from vnca.core import Box
 from vnca.engine.automaton import stencil
 from vnca.engine.domain import Domain

@@ -1,11 +1,12 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
-from vnca.bench import contenders
+from vnca.bench import contenders, onnx
 from vnca.bench.step import (
     StepConfig,
     StepRun,
@@ -14,9 +15,10 @@ from vnca.bench.step import (
     needed_flop,
     prepare,
 )
+from vnca.core import FloatArray
 from vnca.core.errors import BackendUnavailableError, DisagreementError, OptionError, VncaError
 from vnca.engine import native
-from vnca.engine.native import BACKEND
+from vnca.engine.native import BACKEND, bricks
 from vnca.engine.reference import equations as reference
 from vnca.engine.triton import step as triton
 
@@ -45,8 +47,8 @@ def test_every_backend_and_pass_gets_a_row_of_plausible_figures(small: Make) -> 
         assert 0 < row["occupancy"] < 1
         assert 0 < row["ns_per_cell_min"] <= row["ns_per_cell"] <= row["ns_per_cell_max"]
         assert row["gflops"] > 0
-        assert 0 < row["share_of_gemm"] < 1
-        assert row["gemm_gflops"] == pytest.approx(run.gemm_gflops, abs=0.1)
+        assert 0 < row["share_of_peak"] < 1
+        assert row["peak_gflops"] == pytest.approx(run.peak_gflops, abs=0.1)
         assert row["peak_mb"] is None or row["peak_mb"] >= 0
 
 
@@ -76,30 +78,49 @@ def test_the_native_kernel_takes_part_in_bfloat16_where_the_processor_has_it(sma
             prepare(config)
 
 
-def wrong_state(state: Tensor, *rest: Any) -> Tensor:
-    result = reference.update(state, *rest)
-    return result + 1e-3 * (result - state)
-
-
 def wrong_gradient(state: Tensor, *rest: Any) -> Tensor:
     result = reference.update(state, *rest)
     return result + 0.01 * (state - state.detach())
 
 
-@pytest.mark.parametrize(
-    ("update", "complaint"),
-    [(wrong_state, "native: state"), (wrong_gradient, "native: gradient of the state")],
-)
-def test_nothing_is_timed_when_a_backend_computes_something_else(
-    small: Make,
-    monkeypatch: pytest.MonkeyPatch,
-    update: Callable[..., Tensor],
-    complaint: str,
+def test_nothing_is_timed_when_a_backend_computes_another_gradient(
+    small: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(type(BACKEND), "update", lambda self, **options: update)
+    monkeypatch.setattr(type(BACKEND), "update", lambda self, **options: wrong_gradient)
     monkeypatch.setattr("vnca.bench.step.measure", pytest.fail)
-    with pytest.raises(DisagreementError, match=complaint):
+    with pytest.raises(DisagreementError, match="native: gradient of the state"):
         rows_of(small(backends=("plain", "native")))
+
+
+@pytest.mark.skipif(native.unavailable() is not None, reason="no native kernel")
+def test_nothing_is_timed_when_a_backend_computes_another_state(
+    small: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = bricks.forward
+
+    def wrong(state: FloatArray, *rest: Any, **options: Any) -> FloatArray:
+        after = right(state, *rest, **options)
+        return after + np.float32(1e-3) * (after - state)
+
+    monkeypatch.setattr(bricks, "forward", wrong)
+    monkeypatch.setattr("vnca.bench.step.measure", pytest.fail)
+    with pytest.raises(DisagreementError, match="native: state"):
+        rows_of(small(backends=("plain", "native")))
+
+
+@pytest.mark.skipif(onnx.unavailable() is not None, reason="ONNX Runtime is not installed")
+def test_onnx_runtime_agrees_and_is_timed_forward_only(small: Make) -> None:
+    rows = rows_of(small(backends=("plain", "onnx")))
+    assert [(row["backend"], row["pass"]) for row in rows] == [
+        ("plain", "forward"),
+        ("plain", "both"),
+        ("onnx", "forward"),
+    ]
+
+
+def test_onnx_runtime_is_refused_where_it_is_not_compared(small: Make) -> None:
+    with pytest.raises(BackendUnavailableError, match="onnx: "):
+        prepare(small(backends=("onnx",), dtypes=("bfloat16",)))
 
 
 def test_a_state_of_nothing_but_nan_is_a_disagreement(

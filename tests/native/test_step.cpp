@@ -205,6 +205,53 @@ Results<float> results(const Kernel& kernel, const Problem& p, int threads) {
     return to;
 }
 
+// Neighbours as bricks have them: each cell has one of its own.
+struct InBricks {
+    std::vector<std::int32_t> around, places, hashes;
+
+    explicit InBricks(const Problem& p)
+        : around(HALOED * p.cells), places(p.cells), hashes(p.cells, -1) {
+        constexpr int MIDDLE = NEXT_X + NEXT_Y + 1;
+        for (std::int64_t cell = 0; cell < p.cells; ++cell) {
+            places[cell] = std::int32_t(HALOED * cell + MIDDLE);
+            for (int o = 0; o < NEIGHBOURS; ++o)
+                around[HALOED * cell + o / 9 * NEXT_X + o / 3 % 3 * NEXT_Y + o % 3] =
+                    p.neighbours[o * p.cells + cell];
+        }
+        // With a key of 0, what mixes to 0 changes and what does not is chosen here.
+        for (const std::int32_t row : p.rows) hashes[row] = 0;
+    }
+
+    Bricks bricks() const {
+        return {std::int64_t(places.size()), around.data(), places.data()};
+    }
+    Mask mask() const { return {hashes.data(), 0, 1}; }
+};
+
+void test_bricks(const Problem& p) {
+    InBricks in(p);
+    for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel) {
+        const std::string where = std::string(p.of.name) + " in bricks, " + (*kernel)->name + ": ";
+        const std::vector<float> right = results(**kernel, p, 1).state;
+        for (const int threads : THREADS) {
+            std::vector<float> got(p.state.size(), 1e30f);
+            expect(forward(**kernel, p.step(), in.bricks(), in.mask(), got.data(), threads),
+                   where + "a right problem is refused");
+            expect(got == right, where + "other bits than with listed neighbours");
+        }
+        if (p.rows.empty()) continue;
+        std::vector<float> ignored(p.state.size());
+        const std::size_t cell = p.rows.back();
+        for (std::int32_t* entry : {&in.around[HALOED * cell + 5], &in.places[cell]})
+            for (const std::int32_t wrong : {-1, INT32_MAX}) {
+                const std::int32_t before = std::exchange(*entry, wrong);
+                expect(!forward(**kernel, p.step(), in.bricks(), in.mask(), ignored.data(), 2),
+                       where + "what is out of range is accepted");
+                *entry = before;
+            }
+    }
+}
+
 void test_agreement(const Problem& p) {
     const Results<double> in_float = exact(p, false), in_bfloat16 = exact(p, true);
     for (const Kernel* const* kernel = kernels(); *kernel != nullptr; ++kernel) {
@@ -270,7 +317,10 @@ void test_an_exception_reaches_the_caller() {
 }  // namespace
 
 int main() {
-    for (const Case& c : CASES) test_agreement(Problem(c));
+    for (const Case& c : CASES) {
+        test_agreement(Problem(c));
+        test_bricks(Problem(c));
+    }
     test_neighbours_out_of_range();
     test_callers_at_the_same_time();
     test_an_exception_reaches_the_caller();

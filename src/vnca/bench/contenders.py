@@ -1,24 +1,26 @@
 """Smoke-shaped cells to step on, and every backend's step of them, in the layout it works in.
 
-Among them the step as the field writes it: the fixed baseline that all are compared with.
+Among them the step as the field writes it (`plain.py`): the fixed baseline.
 """
 
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
-from torch.nn import functional
 
+from vnca.bench import onnx
+from vnca.bench.plain import Grid, depthwise, input_order, plain_step
 from vnca.core import AnyArray, BoolArray, FloatArray, Index, IntArray
 from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.engine import Compute, backend_named, choose
-from vnca.engine.automaton import FILTERS, Weights, changing_rows, stencil
+from vnca.engine.automaton import FILTERS, Automaton, Weights, changing_rows, stencil
 from vnca.engine.domain import Domain
+from vnca.engine.native import bricks
 from vnca.rule import PRIORS
 
 CHANNELS, PROBABILITY = 12, 0.5
@@ -125,8 +127,8 @@ class Place(NamedTuple):
         return torch.as_tensor(values).to(self.device, self.dtype, copy=True)
 
 
-BACKENDS = ("plain", "compile", "reference", "native", "triton")
-"""`compile` is `plain` under `torch.compile`."""
+BACKENDS = ("plain", "compile", "onnx", "reference", "native", "triton")
+"""`compile` is `plain` under `torch.compile`, `onnx` the same in ONNX Runtime, forward only."""
 PASSES = ("forward", "backward", "both")
 DTYPES = {
     "float32": torch.float32,
@@ -138,114 +140,6 @@ DTYPES = {
 native kernel keeps states in float32."""
 
 
-def plain_step(
-    grid: Tensor,
-    mask: Tensor,
-    priors: Tensor,
-    filters: Tensor,
-    hidden: Tensor,
-    bias: Tensor,
-    output: Tensor,
-) -> Tensor:
-    """The state after one step; differentiable.
-
-    Args:
-        grid: State `[1, C, x, y, z]`, zero where no cell is active.
-        mask: `[1, 1, x, y, z]`, 1 where cells change, 0 elsewhere.
-        priors: `[1, P, x, y, z]`.
-        filters: `[4C, 1, 3, 3, 3]` from `depthwise`.
-        hidden: W1 `[H, 5C + P, 1, 1, 1]`, its inputs in the order of `input_order`.
-        bias: b1 `[H]`.
-        output: W2 `[C, H, 1, 1, 1]`.
-
-    Returns:
-        `[1, C, x, y, z]`.
-    """
-    padded = functional.pad(grid, (1,) * 6, mode="replicate")
-    perceived = functional.conv3d(padded, filters, groups=grid.shape[1])
-    z = torch.cat([grid, perceived, priors], dim=1)
-    changed = functional.conv3d(torch.relu(functional.conv3d(z, hidden, bias)), output)
-    return grid + mask * changed
-
-
-def depthwise(stencil: Tensor, channels: int) -> Tensor:
-    """The filters of `[5, 27]` but the identity, for each channel: `[4C, 1, 3, 3, 3]`."""
-    return stencil[1:].view(FILTERS - 1, 1, 3, 3, 3).repeat(channels, 1, 1, 1, 1)
-
-
-def input_order(channels: int, priors: int) -> Tensor:
-    """Which of a rule's inputs comes where in `plain_step`.
-
-    A depthwise convolution puts out all filters of a channel together, a rule all channels of a
-    filter.
-    """
-    order = torch.arange(FILTERS * channels + priors)
-    filtered = slice(channels, FILTERS * channels)
-    order[filtered] = order[filtered].view(FILTERS - 1, channels).t().flatten()
-    return order
-
-
-class Grid:
-    """The box of a domain as a dense grid, which values on a list of cells come to and go from."""
-
-    def __init__(self, domain: Domain, device: torch.device | str) -> None:
-        if domain.border != "replicate":
-            raise ValueError("the plain step repeats its border")
-        self._shape = domain.box.shape
-        self._places = torch.from_numpy(domain.places).to(device)
-
-    def spread(self, values: Tensor) -> Tensor:
-        """`[1, K, x, y, z]` of values `[n, K]`, zero where no cell is active; differentiable."""
-        flat = values.new_zeros(values.shape[1], int(np.prod(self._shape)))
-        return flat.index_copy(1, self._places, values.t()).view(1, -1, *self._shape)
-
-    def collect(self, grid: Tensor) -> Tensor:
-        """`[n + 1, K]` of a grid, with a last row of zeros; differentiable."""
-        cells = grid[0].flatten(1).index_select(1, self._places).t()
-        return functional.pad(cells, (0, 0, 0, 1))
-
-
-class PlainUpdate:
-    """The plain step on a list of cells, for a place where a backend's step is expected.
-
-    What it is given is spread over the grid and collected again in every step, which the field
-    would not do: two of the many passes over memory that the step takes.
-    """
-
-    def __init__(
-        self, domain: Domain, device: torch.device | str, *, compiled: bool = False
-    ) -> None:
-        self._grid = Grid(domain, device)
-        self._step = torch.compile(plain_step) if compiled else plain_step
-        self._known: tuple[Tensor, Tensor] | None = None  # priors as a list, and as a grid
-
-    def __call__(
-        self,
-        state: Tensor,
-        rows: Tensor,
-        neighbours: Tensor,
-        priors: Tensor,
-        weights: Weights,
-        stencil: Tensor,
-    ) -> Tensor:
-        """As `vnca.engine.reference.equations.update`; `neighbours` are those of the domain."""
-        if self._known is None or self._known[0] is not priors:
-            self._known = priors, self._grid.spread(priors)
-        channels = state.shape[1]
-        changing = state.new_zeros(len(priors), 1).index_fill(0, rows.long(), 1)
-        ordered = weights.hidden[:, input_order(channels, priors.shape[1]).to(state.device)]
-        grid = self._step(
-            self._grid.spread(state[:-1]),
-            self._grid.spread(changing),
-            self._known[1],
-            depthwise(stencil, channels),
-            ordered[..., None, None, None],
-            weights.bias,
-            weights.output[..., None, None, None],
-        )
-        return self._grid.collect(grid)
-
-
 class Contender(NamedTuple):
     """A step in a backend's own layout.
 
@@ -254,12 +148,14 @@ class Contender(NamedTuple):
         inputs: State, W1, b1 and W2.
         gradient: Of the new state.
         listed: Brings a new state and gradients of the inputs into the layout of a `Case`.
+        has_gradients: Whether it has other passes than forward.
     """
 
     step: Callable[..., Tensor]
     inputs: tuple[Tensor, ...]
     gradient: Tensor
     listed: Callable[..., tuple[Tensor, ...]]
+    has_gradients: bool = True
 
     def begin(self, part: str) -> Callable[[], tuple[Tensor, ...]]:
         """What a pass does, with all done that comes before it."""
@@ -285,8 +181,8 @@ def contender(case: Case, name: str, place: Place, *, threads: int) -> Contender
     Raises:
         BackendUnavailableError: If it cannot run there.
     """
-    if name in ("plain", "compile"):
-        return _plain(case, place, compiled=name == "compile")
+    if name in ("plain", "compile", "onnx"):
+        return _dense(case, place, name, threads=threads)
     return _packaged(case, name, place, threads=threads)
 
 
@@ -314,6 +210,9 @@ def _why_not(name: str, dtype: str, device: str) -> str | None:
         return None
     if name == "compile":
         return _why_not_compiled(device)
+    if name == "onnx":
+        is_here = device == "cpu" and dtype == "float32"
+        return onnx.unavailable() if is_here else f"compared in float32 on the CPU, not {dtype}"
     try:
         backend = choose(Compute(name, device), differentiable=True)
     except BackendUnavailableError as error:
@@ -334,7 +233,8 @@ def _why_not_compiled(device: str) -> str | None:
     return None
 
 
-def _plain(case: Case, place: Place, *, compiled: bool) -> Contender:
+def _dense(case: Case, place: Place, name: str, *, threads: int) -> Contender:
+    """The plain step, as it is, compiled, or in ONNX Runtime."""
     domain, grid = case.domain, Grid(case.domain, place.device)
     changing = torch.zeros(len(domain), 1)
     changing[torch.from_numpy(case.rows).long()] = 1
@@ -344,6 +244,9 @@ def _plain(case: Case, place: Place, *, compiled: bool) -> Contender:
 
     def step(state: Tensor, hidden: Tensor, bias: Tensor, output: Tensor) -> Tensor:
         return apply(state, mask, priors, filters, hidden, bias, output)
+
+    def listed_state(state: Tensor, *_: Tensor) -> tuple[Tensor, ...]:
+        return (grid.collect(state),)
 
     def listed(
         state: Tensor, to_state: Tensor, to_hidden: Tensor, to_bias: Tensor, to_output: Tensor
@@ -357,7 +260,7 @@ def _plain(case: Case, place: Place, *, compiled: bool) -> Contender:
             to_output.flatten(1),
         )
 
-    apply = torch.compile(plain_step) if compiled else plain_step
+    apply = torch.compile(plain_step) if name == "compile" else plain_step
     hidden, bias, output = case.weights
     inputs = (
         grid.spread(place.tensor(case.state[:-1])),
@@ -366,6 +269,17 @@ def _plain(case: Case, place: Place, *, compiled: bool) -> Contender:
         place.tensor(output[..., None, None, None]),
     )
     gradient = grid.spread(place.tensor(case.gradient[:-1]))
+    if name == "onnx":
+        run = onnx.onnx_step(
+            *(each.numpy() for each in (mask, priors, filters, *inputs[1:])), threads=threads
+        )
+        return Contender(
+            lambda state, *_: torch.from_numpy(run(state.numpy())),
+            inputs,
+            gradient,
+            listed_state,
+            has_gradients=False,
+        )
     return Contender(step, tuple(t.requires_grad_() for t in inputs), gradient, listed)
 
 
@@ -388,5 +302,24 @@ def _packaged(case: Case, name: str, place: Place, *, threads: int) -> Contender
     def step(state: Tensor, *weights: Tensor) -> Tensor:
         return update(state, rows, neighbours, priors, Weights(*weights), filters)
 
+    if name == "native":
+        step = partial(_native_step, step, case, {"threads": threads, "precision": precision})
     inputs = tuple(place.tensor(array).requires_grad_() for array in (case.state, *case.weights))
     return Contender(step, inputs, place.tensor(case.gradient), lambda *results: results)
+
+
+def _native_step(
+    with_gradients: Callable[..., Tensor],
+    case: Case,
+    options: dict[str, Any],
+    state: Tensor,
+    *weights: Tensor,
+) -> Tensor:
+    """The native step as its sessions take it: in bricks, where no gradient is wanted."""
+    if torch.is_grad_enabled():
+        return with_gradients(state, *weights)
+    arrays = Weights(*(each.detach().numpy() for each in weights))
+    automaton = Automaton(arrays, stencil(), PROBABILITY, seed=0)
+    hashes = case.domain.hashes.view(np.int32)
+    inputs = (state.detach().numpy(), case.domain.around, hashes, case.priors, automaton, 0)
+    return torch.from_numpy(bricks.forward(*inputs, **options))

@@ -29,7 +29,7 @@ from vnca.core import Index
 from vnca.core.errors import OptionError
 from vnca.engine import device_named
 from vnca.engine.automaton import NEIGHBOURS
-from vnca.engine.native import default_threads
+from vnca.engine.native import default_threads, multiply_adds, unavailable
 from vnca.rule import PRIORS
 
 ARRAYS = ("state", "gradient of the state", "gradient of W1", "gradient of b1", "gradient of W2")
@@ -41,8 +41,13 @@ TOLERANCES = {
 }
 """For the state and for gradients, against the reference in float64. Gradients are given more: a
 hidden unit so near zero that rounding turns it on or off changes them by a jump."""
-_GEMMS = 4
-"""Matrix products a repeat: the peak is the best of all."""
+_TRIES = 4
+"""Of the peak a repeat: it is the best of all."""
+_ROUNDS = 100_000
+
+
+PEAKS = {"registers": "multiply-adds in registers", "gemm": "GEMM"}
+"""What a machine's peak of arithmetic may be that of."""
 
 
 class Peak(NamedTuple):
@@ -51,28 +56,43 @@ class Peak(NamedTuple):
     Attributes:
         work: One call of it.
         amount: Floating-point operations, or bytes read and written.
+        name: Of the work.
     """
 
     work: Callable[[], object]
     amount: float
+    name: str
 
     def begin(self) -> Callable[[], object]:
         """Nothing has to be done before."""
         return self.work
 
 
+def arithmetic(place: Place, threads: int) -> Peak:
+    """Multiply-adds in registers, where the native kernel was built; a GEMM elsewhere.
+
+    How fast a GEMM is depends on its library and sizes, and on the CPU varies from run to run.
+    """
+    precision = "bfloat16" if place.dtype == torch.bfloat16 else "float32"
+    if place.device != "cpu" or unavailable(precision) is not None:
+        return gemm(place)
+    operations = multiply_adds(1, precision=precision, threads=threads)
+    work = partial(multiply_adds, _ROUNDS, precision=precision, threads=threads)
+    return Peak(work, operations * _ROUNDS, "registers")
+
+
 def gemm(place: Place) -> Peak:
     """A product of square matrices."""
     size = 1024 if place.device == "cpu" else 8192
     left, right, product = (place.tensor(torch.rand(size, size)) for _ in range(3))
-    return Peak(lambda: torch.mm(left, right, out=product), 2.0 * size**3)
+    return Peak(lambda: torch.mm(left, right, out=product), 2.0 * size**3, "gemm")
 
 
 def copying(place: Place) -> Peak:
     """A copy between two arrays that no cache holds."""
     size = 1 << (27 if place.device == "cpu" else 30)
     source, target = (torch.ones(size, dtype=torch.uint8, device=place.device) for _ in range(2))
-    return Peak(lambda: target.copy_(source), 2.0 * size)
+    return Peak(lambda: target.copy_(source), 2.0 * size, "copy")
 
 
 @dataclass(frozen=True)
@@ -86,7 +106,7 @@ class StepConfig:
     occupancy: float = 1.0
     """Share of the active cells, in a ragged column; rows say what it really is."""
     backends: tuple[str, ...] = ()
-    """Of plain, compile, reference, native and triton; all that can run here unless given."""
+    """Of plain, compile, onnx, reference, native and triton; all that can run here unless given."""
     passes: tuple[str, ...] = ("forward", "both")
     """Of forward, backward and both, which is a forward pass and its gradient."""
     dtypes: tuple[str, ...] = ("float32",)
@@ -135,13 +155,15 @@ class StepRun(NamedTuple):
 
     Attributes:
         dtype: The type.
-        gemm_gflops: Peak of matrix products, GFLOP/s.
+        peak_of: What that is the peak of: multiply-adds in `registers`, or a `gemm`.
+        peak_gflops: Peak of arithmetic, GFLOP/s.
         copy_gbs: Peak of copying, GB read and written a second.
         rows: One a backend and pass, by column.
     """
 
     dtype: str
-    gemm_gflops: float
+    peak_of: str
+    peak_gflops: float
     copy_gbs: float
     rows: list[dict[str, Any]]
 
@@ -214,7 +236,8 @@ def differences(
     right = exact.begin("both" if gradients else "forward")()
     for _, name, backend in entries:
         (state,) = backend.begin("forward")()
-        to_inputs = backend.begin("both")()[1:] if gradients else backend.inputs
+        both = gradients and backend.has_gradients
+        to_inputs = backend.begin("both")()[1:] if both else backend.inputs
         results = backend.listed(state, *to_inputs)
         for array, got, expected in zip(ARRAYS, results, right, strict=False):
             difference = got.detach().to(expected) - expected
@@ -226,16 +249,17 @@ def measure(entries: Sequence[Entry], config: StepConfig, dtype: str) -> StepRun
     """Time the entries in turns with the machine's peaks, then see what memory each takes."""
     _set_tf32(dtype)
     place = Place(config.device, DTYPES[dtype])
-    product, copy = gemm(place), copying(place)
+    product, copy = arithmetic(place, config.threads), copying(place)
     passes = {
         (at, part): partial(entry.contender.begin, part)
         for at, entry in enumerate(entries)
         for part in config.passes
+        if part == "forward" or entry.contender.has_gradients
     }
-    peaks = {(-1, f"gemm {i}"): product.begin for i in range(_GEMMS)} | {(-1, "copy"): copy.begin}
+    peaks = {(-1, f"{i}"): product.begin for i in range(_TRIES)} | {(-1, "copy"): copy.begin}
     times = in_turns({**peaks, **passes}, place.device, config.repeats)
     best = {part: min(times[-1, part]) for _, part in peaks}
-    gemm_peak = product.amount / min(took for part, took in best.items() if part != "copy")
+    peak = product.amount / min(took for part, took in best.items() if part != "copy")
     copy_peak = copy.amount / best["copy"]
     rows = []
     for (at, part), begin in passes.items():
@@ -255,14 +279,15 @@ def measure(entries: Sequence[Entry], config: StepConfig, dtype: str) -> StepRun
                 "ns_per_cell": round(spread.median * 1e9 / alive, 4),
                 "ns_per_cell_max": round(spread.most * 1e9 / alive, 4),
                 "gflops": round(flops / 1e9, 2),
-                "share_of_gemm": round(flops / gemm_peak, 4),
+                "share_of_peak": round(flops / peak, 4),
                 "share_of_copy": round(bytes_ / copy_peak, 4),
-                "gemm_gflops": round(gemm_peak / 1e9, 1),
+                "peak_of": product.name,
+                "peak_gflops": round(peak / 1e9, 1),
                 "copy_gbs": round(copy_peak / 1e9, 1),
                 "peak_mb": peak_mb(begin(), place.device),
             }
         )
-    return StepRun(dtype, gemm_peak / 1e9, copy_peak / 1e9, rows)
+    return StepRun(dtype, product.name, peak / 1e9, copy_peak / 1e9, rows)
 
 
 def needed_flop(hidden: int) -> dict[str, int]:

@@ -14,7 +14,7 @@ from typing import Any
 import torch
 
 from vnca.bench import Difference, Spread, peak_mb, require_agreement
-from vnca.bench.contenders import PlainUpdate
+from vnca.bench.plain import PlainUpdate
 from vnca.core import FloatArray
 from vnca.core.volume import Volume
 from vnca.engine import StepSession

@@ -9,7 +9,7 @@ import torch
 
 from vnca.bench import run_facts
 from vnca.bench.contenders import available, require
-from vnca.bench.step import TOLERANCES, StepConfig, StepRun, measure_steps, prepare
+from vnca.bench.step import PEAKS, TOLERANCES, StepConfig, StepRun, measure_steps, prepare
 from vnca.bench.train import Training, measure_training
 from vnca.cli.bench import Rows, Tables, parse_bench, short
 from vnca.cli.demo import STYLE
@@ -56,7 +56,7 @@ def run_step(arguments: Sequence[str]) -> None:
     for run in measure_steps(options.config):
         options.print("\n".join(_step_table(run)))
         rows += run.rows
-    peaks = {name: rows[0][name] for name in ("gemm_gflops", "copy_gbs")}
+    peaks = {name: rows[0][name] for name in ("peak_gflops", "copy_gbs")}
     options.keep(facts, rows, peaks)
 
 
@@ -67,10 +67,10 @@ def _step_table(run: StepRun) -> list[str]:
         "",
         f"{run.dtype}, {first['grid']} cells, {first['occupancy']:.1%} active, hidden "
         f"{first['hidden']}",
-        f"peaks: GEMM {run.gemm_gflops:.1f} GFLOP/s, copy {run.copy_gbs:.1f} GB/s",
+        f"peaks: {PEAKS[run.peak_of]} {run.peak_gflops:.1f} GFLOP/s, copy {run.copy_gbs:.1f} GB/s",
         f"all agree with the reference in float64: states to {to_state:.0e}, gradients to "
         f"{to_gradients:.0e} of their norm",
-        f"{'backend':10}{'pass':9}{'ns a cell (min to max)':>32}{'GFLOP/s':>10}{'of GEMM':>9}"
+        f"{'backend':10}{'pass':9}{'ns a cell (min to max)':>32}{'GFLOP/s':>10}{'of peak':>9}"
         f"{'of copy':>9}{'MB':>9}{'against plain':>15}",
     ]
     for row in run.rows:
@@ -81,7 +81,7 @@ def _step_table(run: StepRun) -> list[str]:
             gain = f"{plain[row['pass']]['ns_per_cell'] / row['ns_per_cell']:.1f}×"
         lines.append(
             f"{row['backend']:10}{row['pass']:9}{took:>10} {spread:>21}"
-            f"{row['gflops']:>10.1f}{row['share_of_gemm']:>9.1%}{row['share_of_copy']:>9.1%}"
+            f"{row['gflops']:>10.1f}{row['share_of_peak']:>9.1%}{row['share_of_copy']:>9.1%}"
             f"{short(row['peak_mb']):>9}{gain:>15}"
         )
     return lines

@@ -21,6 +21,7 @@ from vnca.core.bricks import (
     sorted_bricks,
 )
 from vnca.core.errors import GridError
+from vnca.core.marks import Marks, packed, unpacked
 
 MOST_CELLS = 2**27
 """A larger box (512³) becomes one array only if a good part of it holds something."""
@@ -295,11 +296,9 @@ def _flat_places(places: Places, runs: AnyArray, lengths: AnyArray, cells: AnyAr
 def dilated(marked: Field, cells: int) -> Field:
     """Cells at most `cells` cells along each axis from one in a field of booleans, in its box."""
     bricks = bricks_beside(marked.bricks, -(-cells // EDGE))
-    grown = replace(marked, bricks=bricks, values=marked.blocks(bricks))
-    for axis in range(3):
-        for _ in range(cells):
-            ahead, behind = grown.shifted(axis, 1), grown.shifted(axis, -1)
-            np.logical_or(grown.values, np.logical_or(ahead, behind, out=ahead), out=grown.values)
+    bits = Marks(bricks).dilated(packed(marked.blocks(bricks)), cells)
+    held = bits.any(axis=1)
+    grown = replace(marked, bricks=bricks[held], values=unpacked(bits[held]))
     return grown.within(marked.box).trimmed()
 
 

@@ -71,7 +71,9 @@ class _Block(nn.Module):
         super().__init__()
         wide = shape.inputs * shape.growth
         self.expand = nn.Conv2d(shape.inputs, wide, 1) if shape.growth > 1 else None
-        self.look = nn.Conv2d(wide, wide, shape.kernel, shape.stride, groups=wide)
+        # What is the same on all sides needs no padded copy, nor the gradient of one.
+        around = shape.kernel // 2 if shape.stride == 1 else 0
+        self.look = nn.Conv2d(wide, wide, shape.kernel, shape.stride, around, groups=wide)
         self.project = nn.Conv2d(wide, shape.outputs, 1)
         self.adds = shape.stride == 1 and shape.inputs == shape.outputs
 
@@ -179,6 +181,8 @@ class EfficientNet(nn.Module):
 def _same(layer: nn.Conv2d, x: Tensor) -> Tensor:
     """A convolution that gives ⌈n / stride⌉ rows and columns; what is odd is padded at the end."""
     kernel, stride = layer.kernel_size[0], layer.stride[0]
+    if stride == 1:
+        return layer(x)  # padded by itself
     missing = [max(0, (-(-n // stride) - 1) * stride + kernel - n) for n in x.shape[2:]]
     (top, bottom), (left, right) = ((n // 2, n - n // 2) for n in missing)
     return layer(functional.pad(x, (left, right, top, bottom)))

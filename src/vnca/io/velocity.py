@@ -10,7 +10,9 @@ from vnca.core import AnyArray, BoolArray, Box, FloatArray
 from vnca.core.bricks import CELLS, EDGE, cells_at
 from vnca.core.errors import BackendUnavailableError, GridError, OptionError
 from vnca.core.field import Field, dilated
+from vnca.core.marks import WAYS, Marks, packed, unpacked
 from vnca.core.volume import Volume
+from vnca.engine import native
 
 _LEAST_SHARE = 1e-6
 _SAMPLE, _FEWEST_CHANGES = 4000, 64
@@ -115,31 +117,38 @@ def extrapolated(values: Field, known: Field, layers: int) -> tuple[Field, Field
     reached = dilated(known, layers)
     box, bricks = reached.box, reached.bricks
     inside = replace(reached, values=np.ones_like(reached.values), outside=False).within(box).values
-    filled = replace(known, bricks=bricks, values=known.blocks(bricks))
+    filled = known.blocks(bricks)
     # Laid out flat, where a list of cells is much quicker to fetch; and nothing behind.
     flat = np.concatenate(
         [values.blocks(bricks).reshape(-1, 3), np.zeros((CELLS, 3), values.values.dtype)]
     )
-    flat[:-CELLS][~filled.values.reshape(-1)] = 0
-    is_filled = np.concatenate([filled.values.reshape(-1), np.zeros(CELLS, bool)])
-    filled = replace(filled, values=is_filled[:-CELLS].reshape(filled.values.shape))
-    beside = {
-        (axis, step): filled.places.find(bricks + step * np.eye(3, dtype=np.int32)[axis]) * CELLS
-        for axis, step in product(range(3), (-1, 1))
-    }
+    flat[:-CELLS][~filled.reshape(-1)] = 0
+    is_filled = np.concatenate([filled.reshape(-1), np.zeros(CELLS, bool)])
+    marks, bits, wanted = Marks(bricks), packed(filled), packed(inside)
+    beside = np.stack(list(marks.rows_beside.values())) * CELLS
+    fill = native.fill if native.unavailable() is None else fill_with_means
     for _ in range(layers):
-        rim = np.logical_or.reduce([filled.shifted(*way) for way in beside])
-        front = np.flatnonzero(rim & inside & ~filled.values)
-        # In double precision the sum of up to six equal floats is exact.
-        total, count = np.zeros((len(front), 3)), np.zeros(len(front))
-        for way, bricks_there in beside.items():
-            there = _next_cells(front, *way, bricks_there)
-            total += flat.take(there, axis=0)
-            count += is_filled.take(there)
-        flat[front] = total / count[:, None]
+        rim = marks.beside(bits) & wanted & ~bits
+        bits |= rim
+        front = np.flatnonzero(unpacked(rim))
+        fill(flat, is_filled, front, beside)
         is_filled[front] = True
-    found = flat[:-CELLS].reshape(*filled.values.shape, 3)
-    return Field(bricks, found, box), filled
+    shape = filled.shape
+    found, known_now = flat[:-CELLS].reshape(*shape, 3), is_filled[:-CELLS].reshape(shape)
+    return Field(bricks, found, box), replace(known, bricks=bricks, values=known_now)
+
+
+def fill_with_means(
+    values: FloatArray, known: BoolArray, cells: AnyArray, beside: AnyArray
+) -> None:
+    """As `vnca.engine.native.fill`, in numpy."""
+    # In double precision the sum of up to six equal floats is exact.
+    total, count = np.zeros((len(cells), 3)), np.zeros(len(cells))
+    for (axis, step), bricks in zip(WAYS, beside, strict=True):
+        there = _next_cells(cells, axis, step, bricks)
+        total += np.where(known.take(there)[:, None], values.take(there, axis=0), 0)
+        count += known.take(there)
+    values[cells] = total / count[:, None]
 
 
 def _next_cells(cells: AnyArray, axis: int, step: int, beside: AnyArray) -> AnyArray:

@@ -18,7 +18,7 @@ from vnca.core import Box, FloatArray, IntArray
 from vnca.core.errors import OptionError
 from vnca.core.field import Field
 from vnca.core.volume import Volume, dense, field_of
-from vnca.engine import Compute, open_session
+from vnca.engine import Compute, Session, open_session
 from vnca.engine.domain import Domain, DomainKind
 from vnca.io.smoke_format import on_one_lattice
 from vnca.io.velocity import extrapolated
@@ -152,6 +152,20 @@ class _Parts(NamedTuple):
     factors: FloatArray
 
 
+class Ready(NamedTuple):
+    """A frame, with all that painting it takes beside what the frame before it left.
+
+    Attributes:
+        smoke: On a grid as fine as the automaton's.
+        domain: Its active cells.
+        session: The automaton on them; None if there are none.
+    """
+
+    smoke: Volume
+    domain: Domain
+    session: Session | None
+
+
 @dataclass(frozen=True, eq=False)
 class Roll:
     """A rule made ready for a sequence.
@@ -216,31 +230,45 @@ class Roll:
         """The state before the first frame."""
         return RollState.empty(self.rule.config.channels)
 
-    def paint(self, smoke: Volume, state: RollState) -> Painting:
+    def ready(self, smoke: Volume) -> Ready:
+        """What painting a frame takes that does not wait for the frame before it.
+
+        Args:
+            smoke: On a grid as fine as the automaton's.
+
+        Raises:
+            GridError: If the smoke lacks what the rule is conditioned on.
+        """
+        domain = self._domain(smoke)
+        if len(domain) == 0:
+            return Ready(smoke, domain, None)
+        conditioning = priors(domain, smoke, self.rule)
+        automaton = self.rule.automaton(self.config.seed)
+        return Ready(smoke, domain, open_session(automaton, domain, conditioning, self.compute))
+
+    def paint(self, smoke: Volume | Ready, state: RollState) -> Painting:
         """The next frame, of the same lattice, from the state that the one before it left.
 
         A frame without smoke passes through. The painting starts afresh after it, unless
         the whole box is active.
 
         Args:
-            smoke: On a grid as fine as the automaton's.
+            smoke: On a grid as fine as the automaton's; or what `ready` made of it.
             state: What the frame before it left.
         """
-        domain = self._domain(smoke)
-        state = self._stepped(smoke, domain, state)
-        parts = self._parts(domain, state)
-        del domain  # its table of neighbours is the largest array there is
-        return self._shown(smoke, parts, state)
+        ready = smoke if isinstance(smoke, Ready) else self.ready(smoke)
+        state = self._stepped(ready, state)
+        parts, coarse = self._parts(ready.domain, state), ready.smoke
+        del ready, smoke  # what follows makes arrays of the same order
+        return self._shown(coarse, parts, state)
 
-    def _stepped(self, smoke: Volume, domain: Domain, state: RollState) -> RollState:
+    def _stepped(self, ready: Ready, state: RollState) -> RollState:
         """The state after the steps of a frame."""
-        rule, config = self.rule, self.config
-        if len(domain) == 0:
-            return RollState.empty(rule.config.channels, state.steps_done)
-        warmup = config.warmup if len(state.cells) == 0 else 0
+        domain, session = ready.domain, ready.session
+        if session is None:
+            return RollState.empty(self.rule.config.channels, state.steps_done)
+        warmup = self.config.warmup if len(state.cells) == 0 else 0
         done = state.steps_done + warmup + self.steps_per_frame
-        conditioning = priors(domain, smoke, rule)
-        session = open_session(rule.automaton(config.seed), domain, conditioning, self.compute)
         # What they begin with has no name here, or it would be kept to the last step.
         values = session.run(
             session.upload(self._begun(domain, smoke, state)), range(state.steps_done, done)

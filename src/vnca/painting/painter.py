@@ -8,7 +8,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from vnca.core.errors import (
     FileFormatError,
@@ -26,7 +26,7 @@ from vnca.io.provenance import Provenance, read_provenance
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import up_axis_of
 from vnca.io.vdb import VdbFile
-from vnca.painting import Roll, RollState
+from vnca.painting import Ready, Roll, RollState
 from vnca.painting.frames import VelocityCheck, read_ahead
 from vnca.painting.unfinished import Source, Unfinished
 
@@ -39,13 +39,28 @@ _SAVING_SHARE = 0.02
 """Share of the time that may go into keeping the state."""
 
 
-class _Read(NamedTuple):
-    """Smoke, as fine as it is painted, and where it is from: a file that stays open for writing."""
+@dataclass(eq=False)
+class _Read:
+    """A frame to be painted, and where it is from.
+
+    Attributes:
+        source: What it is from.
+        frame: Which one it is.
+        smoke: As fine as it is painted.
+        file: Stays open for writing.
+        ready: The same made ready, until that is taken.
+    """
 
     source: Source
     frame: Frame
     smoke: Volume
     file: VdbFile | None
+    ready: Ready | None
+
+    def take(self) -> Volume | Ready:
+        """The frame, made ready the first time: what that takes is not kept while it is written."""
+        ready, self.ready = self.ready, None
+        return ready or self.smoke
 
     def require_unchanged(self) -> None:
         """Refuse to copy from a file that was written to since it was read.
@@ -245,7 +260,7 @@ class Painter:
     def _write(self, frame: Frame, read: _Read, state: RollState) -> RollState:
         """Paint smoke to the file of a frame; the state after it."""
         self._velocity.look(read.smoke, read.frame.path)
-        painting = self.roll.paint(read.smoke, state)
+        painting = self.roll.paint(read.take(), state)
         read.require_unchanged()
         if frame == self.sequence[0]:
             # From here on frames of an earlier painting are overwritten, and after an end at any
@@ -288,17 +303,18 @@ class Painter:
                 smoke = read_smoke(
                     frame.path, self.smoke, frame=frame.number, lattice=self.lattice, file=file
                 ).refined(self.roll.grid)
+                if self.roll.box.union(smoke.box) != self.roll.box:
+                    return GridError(
+                        f"{frame.path}: has changed since the start and now has smoke beyond the "
+                        "box of the sequence; start anew"
+                    )
+                ready = self.roll.ready(smoke)
             except BROKEN as error:
                 return error
             except OSError as error:
                 return FileFormatError(f"{frame.path}: cannot be read ({error.strerror})")
-            if self.roll.box.union(smoke.box) != self.roll.box:
-                return GridError(
-                    f"{frame.path}: has changed since the start and now has smoke beyond the box "
-                    "of the sequence; start anew"
-                )
             opened.pop_all()  # it is closed once the frame is painted
-            return _Read(source, frame, smoke, file)
+            return _Read(source, frame, smoke, file, ready)
 
     def _source(self, at: int) -> Source:
         """What a frame of the sequence is painted from, as it is now."""

@@ -14,10 +14,10 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from vnca.core import FloatArray, IntArray
+from vnca.core import AnyArray, FloatArray, IntArray
 from vnca.core.errors import BackendUnavailableError, OptionError, ShapeError
-from vnca.engine import PRECISIONS, ArrayDecode, Backend, Compute, Job, Session, StepSession
-from vnca.engine.automaton import OUTPUTS, DecoderWeights, Weights, mask_key, mask_threshold
+from vnca.engine import PRECISIONS, ArrayDecode, Backend, Compute, Job, Session
+from vnca.engine.automaton import OUTPUTS, DecoderWeights, mask_key, mask_threshold
 
 try:
     import vnca.engine.native._native as _native  # pyright: ignore[reportMissingModuleSource]
@@ -199,6 +199,42 @@ def checked(operation: str, function: Callable[P, T], *args: P.args, **kwargs: P
         ) from None
 
 
+def fill(values: FloatArray, known: AnyArray, cells: AnyArray, beside: AnyArray) -> None:
+    """Give cells the mean of those of their six neighbours that are known.
+
+    Args:
+        values: `[512 (m + 1), 3]` in m bricks of 8³, laid out flat, and in one that is not there.
+        known: `[512 (m + 1)]`, which of them are.
+        cells: `[k]` places of cells that are not and have a neighbour that is, int64, each once.
+        beside: `[6, m]` first places of the bricks beside each, int64, by `core.marks.WAYS`.
+
+    Raises:
+        BackendUnavailableError: If the extension was not built.
+        ShapeError: If arrays are of other shapes or types, or hold places out of range.
+    """
+    arrays = (values, known.view(np.uint8), cells, beside)
+    checked("continuing values", extension().fill, *arrays, default_threads())
+
+
+def multiply_adds(rounds: int, *, precision: str = "float32", threads: int | None = None) -> float:
+    """Multiply-adds of numbers that stay in registers: what a step could do at most.
+
+    Args:
+        rounds: As many times a few, in each thread.
+        precision: Of what is multiplied.
+        threads: How many; by default one for each core.
+
+    Returns:
+        How many operations were done, two for each.
+
+    Raises:
+        BackendUnavailableError: If the extension was not built, or this machine has no bfloat16.
+        OptionError: If there is no precision of that name.
+    """
+    how = (threads or default_threads(), precision == "bfloat16")
+    return extension(precision).multiply_adds(rounds, *how)
+
+
 _OPERATION = "decoding"
 
 
@@ -325,10 +361,11 @@ class NativeBackend(Backend):
 
     def session(self, job: Job) -> Session:
         """See `Backend.session`."""
-        options = {"threads": job.compute.threads, "precision": job.compute.precision}
         if not job.differentiable:
-            update = partial(_update, **options)
-            return StepSession.open(job, draw=changing_rows, update=update)
+            from vnca.engine.native.bricks import BrickSession
+
+            return BrickSession.open(job)
+        options = {"threads": job.compute.threads, "precision": job.compute.precision}
         from vnca.engine.native.autograd import changing_tensor_rows
         from vnca.engine.tensors import tensor_session
 
@@ -349,13 +386,6 @@ class NativeBackend(Backend):
     def array_decode(self, *, threads: int | None = None) -> ArrayDecode:
         """See `Backend.array_decode`."""
         return ArrayDecode(partial(decode, threads=threads), partial(decode_cells, threads=threads))
-
-
-def _update(*arrays: Any, **options: Any) -> FloatArray:
-    """The step on arrays, called as that of the reference is."""
-    state, rows, neighbours, conditioning, weights, stencil = arrays
-    assert isinstance(weights, Weights)
-    return forward(state, rows, neighbours, conditioning, *weights, stencil, **options)
 
 
 BACKEND = NativeBackend()

@@ -1,13 +1,41 @@
 from collections.abc import Sequence
 
-from vnca.core import FloatArray, IntArray
+from vnca.core import AnyArray, FloatArray, IntArray
 
 def instructions(bfloat16: bool, /) -> list[str]: ...
+def multiply_adds(rounds: int, threads: int, bfloat16: bool, /) -> float: ...
+def fill(
+    values: FloatArray,
+    known: AnyArray,
+    cells: AnyArray,
+    beside: AnyArray,
+    threads: int,
+    /,
+) -> None: ...
 def changing_rows(hashes: IntArray, key: int, threshold: int, rows: IntArray, /) -> int: ...
 def forward(
     state: FloatArray,
     rows: IntArray,
     neighbours: IntArray,
+    priors: FloatArray,
+    hidden: FloatArray,
+    bias: FloatArray,
+    output: FloatArray,
+    stencil: FloatArray,
+    out: FloatArray,
+    threads: int,
+    bfloat16: bool,
+    instructions: str,
+    /,
+) -> None: ...
+def forward_bricks(
+    state: FloatArray,
+    around: IntArray,
+    places: IntArray,
+    hashes: IntArray,
+    key: int,
+    threshold: int,
+    all: bool,
     priors: FloatArray,
     hidden: FloatArray,
     bias: FloatArray,

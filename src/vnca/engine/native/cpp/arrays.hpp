@@ -23,6 +23,10 @@ template <class T>
 constexpr const char* NAME = "float32";
 template <>
 inline constexpr const char* NAME<std::int32_t> = "int32";
+template <>
+inline constexpr const char* NAME<std::int64_t> = "int64";
+template <>
+inline constexpr const char* NAME<std::uint8_t> = "uint8";
 
 inline std::string text(const std::vector<std::int64_t>& shape) {
     std::string result = "[";

@@ -5,6 +5,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -12,8 +13,10 @@
 
 #include "arrays.hpp"
 #include "bind_decode.hpp"
+#include "fill.hpp"
 #include "mask.hpp"
 #include "step.hpp"
+#include "thread_pool.hpp"
 
 using namespace vnca;
 
@@ -48,31 +51,40 @@ void read_scales(const float* stencil, float* scale) {
     }
 }
 
-// The arrays of a step, checked but for the range of the neighbours.
+// The arrays of a step, checked but for where neighbours are.
+Step step_of(std::int64_t n, const Input& state, const Input& priors, const Input& first,
+             const Input& bias, const Input& second, const Input& stencil) {
+    const std::int64_t c = length(state, 1), p = length(priors, 1), h = length(first, 0);
+    Step step;
+    step.state = data_of<float>(state, "state", {n + 1, c == 0 ? ANY : c});
+    step.neighbours = nullptr;
+    step.prior_values = data_of<float>(priors, "priors", {n, priors.ndim() == 2 ? p : ANY});
+    in_range("cells", n, 0, INT32_MAX - 1);
+    in_range("channels", c, 1, MOST_CHANNELS);
+    in_range("hidden units", h, 1, MOST_HIDDEN);
+    in_range("priors", p, 0, MOST_PRIORS);
+    step.first = data_of<float>(first, "hidden weights", {h, FILTERS * c + p});
+    step.bias = data_of<float>(bias, "hidden bias", {h});
+    step.second = data_of<float>(second, "output weights", {c, h});
+    read_scales(data_of<float>(stencil, "stencil", {FILTERS, NEIGHBOURS}), step.scale);
+    step.cells = n;
+    step.channels = int(c);
+    step.hidden = int(h);
+    step.priors = int(p);
+    return step;
+}
+
+// A step of listed rows, checked but for the range of rows and neighbours.
 struct Arrays {
     Step step;
     Rows rows;
 
     Arrays(const Input& state, const Input& rows_array, const Input& neighbours,
            const Input& priors, const Input& first, const Input& bias, const Input& second,
-           const Input& stencil) {
-        const std::int64_t n = length(neighbours, 1), c = length(state, 1), p = length(priors, 1),
-                           h = length(first, 0);
-        step.state = data_of<float>(state, "state", {n + 1, c == 0 ? ANY : c});
-        step.neighbours = data_of<std::int32_t>(neighbours, "neighbours", {NEIGHBOURS, n});
-        step.prior_values = data_of<float>(priors, "priors", {n, priors.ndim() == 2 ? p : ANY});
-        in_range("cells", n, 0, INT32_MAX - 1);
-        in_range("channels", c, 1, MOST_CHANNELS);
-        in_range("hidden units", h, 1, MOST_HIDDEN);
-        in_range("priors", p, 0, MOST_PRIORS);
-        step.first = data_of<float>(first, "hidden weights", {h, FILTERS * c + p});
-        step.bias = data_of<float>(bias, "hidden bias", {h});
-        step.second = data_of<float>(second, "output weights", {c, h});
-        read_scales(data_of<float>(stencil, "stencil", {FILTERS, NEIGHBOURS}), step.scale);
-        step.cells = n;
-        step.channels = int(c);
-        step.hidden = int(h);
-        step.priors = int(p);
+           const Input& stencil)
+        : step(step_of(length(neighbours, 1), state, priors, first, bias, second, stencil)) {
+        step.neighbours =
+            data_of<std::int32_t>(neighbours, "neighbours", {NEIGHBOURS, step.cells});
         rows = {data_of<std::int32_t>(rows_array, "rows", {ANY}), length(rows_array, 0)};
     }
 
@@ -121,13 +133,40 @@ NB_MODULE(_native, m) {
         return names;
     });
 
+    m.def("multiply_adds", [](std::int64_t rounds, int threads, bool bfloat16) {
+        const Kernel& kernel = kernel_named("", bfloat16);
+        std::atomic<double> operations = 0;
+        nb::gil_scoped_release released;
+        ThreadPool::of_process().run(threads, threads, [&](int, int) {
+            operations += kernel.multiply_adds(rounds);
+        });
+        return operations.load();
+    });
+
+    m.def("fill", [](Output values, Input known, Input cells, Input beside, int threads) {
+        const std::int64_t bricks = length(beside, 1), count = length(cells, 0);
+        const std::int64_t places = (bricks + 1) * Filling::BRICK;
+        const Filling filling = {
+            bricks, data_of<float>(values, "values", {places, 3}),
+            data_of<std::uint8_t>(known, "known", {places}),
+            data_of<std::int64_t>(beside, "bricks beside", {Filling::WAYS, bricks})};
+        const auto* const to_fill = data_of<std::int64_t>(cells, "cells", {count});
+        check_apart({values}, {known, cells, beside});
+        bool valid;
+        {
+            nb::gil_scoped_release released;
+            valid = fill(filling, to_fill, count, threads);
+        }
+        if (!valid) throw nb::value_error("cells: expected places of unknown cells, and of bricks");
+    });
+
     m.def("changing_rows", [](Input hashes, std::uint32_t key, std::uint32_t threshold, Output rows) {
         const std::int64_t n = length(hashes, 0);
         const auto* const from = data_of<std::int32_t>(hashes, "hashes", {ANY});
         auto* const to = data_of<std::int32_t>(rows, "rows", {n});
         check_apart({rows}, {hashes});
         nb::gil_scoped_release released;
-        return changing_rows(from, n, key, threshold, to);
+        return changing_rows({from, key, threshold}, n, to);
     });
 
     m.def("forward", [](Input state, Input rows, Input neighbours, Input priors, Input first,
@@ -145,6 +184,34 @@ NB_MODULE(_native, m) {
             valid = forward(kernel, step, arrays.rows, to, threads);
         }
         arrays.check_neighbours(valid);
+    });
+
+    m.def("forward_bricks", [](Input state, Input around, Input places, Input hashes,
+                               std::uint32_t key, std::uint32_t threshold, bool all, Input priors,
+                               Input first, Input bias, Input second, Input stencil, Output out,
+                               int threads, bool bfloat16, const std::string& instructions) {
+        const std::int64_t n = length(places, 0), count = length(around, 0);
+        const Step step = step_of(n, state, priors, first, bias, second, stencil);
+        const Kernel& kernel = kernel_named(instructions, bfloat16);
+        const Bricks bricks = {
+            count,
+            data_of<std::int32_t>(around, "rows around bricks",
+                                  {count, HALO_EDGE, HALO_EDGE, HALO_EDGE}),
+            data_of<std::int32_t>(places, "places in bricks", {n}),
+        };
+        const auto* const hashed = data_of<std::int32_t>(hashes, "hashes", {n});
+        const Mask mask = {all ? nullptr : hashed, key, threshold};
+        float* const to = data_of<float>(out, "out", {step.cells + 1, step.channels});
+        check_apart({out}, {state, around, places, hashes, priors, first, bias, second, stencil});
+        bool valid;
+        {
+            nb::gil_scoped_release released;
+            valid = forward(kernel, step, bricks, mask, to, threads);
+        }
+        if (!valid)
+            throw nb::value_error(("bricks: expected rows of the state, from 0 to " +
+                                   std::to_string(step.cells) + ", and places of cells in them")
+                                      .c_str());
     });
 
     m.def("backward", [](Input state, Input rows, Input neighbours, Input priors, Input first,

@@ -2,6 +2,7 @@
 
 #include "block.hpp"
 
+#include "brick.hpp"
 #include "multiply.hpp"
 #include "perceive.hpp"
 #include "vector.hpp"
@@ -32,8 +33,10 @@ struct Layout {
         wide_hidden = round_up(hidden, LANES);
         first_rows = round_up(inputs + 1, HEIGHTS);
         second_rows = round_up(channels, HEIGHTS);
-        // Perception writes whole vectors.
-        const std::size_t reach = (FILTERS - 1) * channels + wide_channels;
+        // Perception writes whole vectors, and so do priors.
+        const std::size_t perceived = (FILTERS - 1) * channels + wide_channels,
+                          told = filtered + round_up(s.priors + 1, LANES),
+                          reach = perceived > told ? perceived : told;
         z_stride = stride_of(first_rows > reach ? first_rows : reach);
         hidden_stride = stride_of(wide_hidden);
         change_stride = stride_of(second_rows > wide_channels ? second_rows : wide_channels);
@@ -57,6 +60,7 @@ Sizes sizes(const Step& s) {
     result.packed = at.packed;
     const std::size_t matrices = at.z_stride + 2 * at.hidden_stride + at.change_stride;
     result.scratch = BLOCK * ((DEPTH > 1 ? 2 : 1) * matrices + at.wide_filtered + LANES);
+    result.brick = HALOED * at.wide_channels;
     result.first_rows = at.first_rows;
     result.second_rows = at.second_rows;
     result.hidden = at.wide_hidden;
@@ -149,35 +153,56 @@ struct Weights {
     }
 };
 
-// z, priors and a one, which the gradient of the bias meets.
-void perceive_block(const Step& s, const Layout& at, const float* tail, const Block& block,
+// z of one cell, from what is around it: at(o), in the order of OFFSETS, gives the first of its
+// channels, a vector of which is `apart` floats from the next.
+template <class At>
+INLINE void perceive_cell(const Layout& layout, const At& at, std::size_t apart, Number* z) {
+    // From the last vector of channels to the first, see the end of `perceive`.
+    for (int v = int(layout.wide_channels) / LANES; v-- > 0;)
+        perceive([&](int o) { return load(at(o) + v * apart); }, z + v * LANES, layout.channels);
+}
+
+// Priors of one cell, and a one, which the gradient of the bias meets.
+INLINE void append_priors(const Step& s, std::int64_t row, Number* to) {
+    const float* const priors = s.prior_values + row * s.priors;
+    if ((row + 1) * s.priors + LANES <= s.cells * s.priors)
+        for (int p = 0; p < s.priors; p += LANES) put(to + p, load(priors + p));
+    else
+        for (int p = 0; p < s.priors; ++p) to[p] = number(priors[p]);
+    to[s.priors] = number(1.0f);
+}
+
+States states_of(const Step& s, const Layout& at, const Weights& weights) {
+    return {s.state, weights.tail, at.safe_rows, std::size_t(at.channels), at.wide_channels};
+}
+
+void perceive_block(const Step& s, const Layout& at, const Weights& weights, const Block& block,
                     Matrix z) {
+    const States states = states_of(s, at, weights);
     for (int i = 0; i < block.count; ++i) {
-        // From the last vector of channels to the first, see the end of `perceive`.
-        for (int c = int(at.wide_channels) - LANES; c >= 0; c -= LANES)
-            perceive(
-                [&](int o) {
-                    const std::int64_t row = block.around[o][i];
-                    const float* const from =
-                        row < at.safe_rows ? s.state + row * at.channels
-                                           : tail + (row - at.safe_rows) * at.wide_channels;
-                    return load(from + c);
-                },
-                z.row(i) + c, at.channels);
-        Number* const after = z.row(i) + at.filtered;
-        const float* const priors = s.prior_values + std::int64_t(block.rows[i]) * s.priors;
-        for (int p = 0; p < s.priors; ++p) after[p] = number(priors[p]);
-        after[s.priors] = number(1.0f);
+        perceive_cell(at, [&](int o) { return states.at(block.around[o][i]); }, LANES, z.row(i));
+        append_priors(s, block.rows[i], z.row(i) + at.filtered);
     }
 }
 
-// The hidden layer of a block. Negative, not "not positive": a state gone wrong stays visible.
-INLINE void hidden_block(const Layout& at, const Weights& weights, const Block& block, Matrix z,
+// The hidden layer of some cells. Negative, not "not positive": a state gone wrong stays visible.
+INLINE void hidden_block(const Layout& at, const Weights& weights, int count, Matrix z,
                          Matrix hidden) {
-    multiply(block.count, int(at.wide_hidden), units(at.inputs), z.left(), weights.first,
+    multiply(count, int(at.wide_hidden), units(at.inputs), z.left(), weights.first,
              [&](int i, int j, Vec v) {
                  v += load(weights.bias + j);
                  put(hidden.row(i) + j, v < 0.0f ? Vec{} : v);
+             });
+}
+
+// Adds the change of some cells, given z, to their rows of the state.
+INLINE void add_change(const Layout& at, const Weights& weights, const std::int32_t* rows, int count,
+                       Matrix z, Matrix hidden, float* out) {
+    hidden_block(at, weights, count, z, hidden);
+    multiply(count, int(at.wide_channels), units(at.hidden), hidden.left(), weights.second,
+             [&](int i, int j, Vec v) {
+                 if (i < count)
+                     add_first(out + std::int64_t(rows[i]) * at.channels + j, v, at.channels - j);
              });
 }
 
@@ -186,17 +211,50 @@ void forward(const Step& s, const float* packed, const Block& block, float* memo
     const Weights weights(at, packed);
     Scratch scratch(memory);
     const Matrix z = scratch.matrix(at.z_stride), hidden = scratch.matrix(at.hidden_stride);
-    float* const change = scratch.floats(at.wide_channels);
+    perceive_block(s, at, weights, block, z);
+    add_change(at, weights, block.rows, block.count, z, hidden, out);
+}
 
-    perceive_block(s, at, weights.tail, block, z);
-    hidden_block(at, weights, block, z, hidden);
-    multiply(block.count, int(at.wide_channels), units(at.hidden), hidden.left(), weights.second,
-             [&](int i, int j, Vec v) { store(change + i * at.wide_channels + j, v); });
-    for (int i = 0; i < block.count; ++i) {
-        float* const to = out + std::int64_t(block.rows[i]) * at.channels;
-        const float* const from = change + i * at.wide_channels;
-        for (int c = 0; c < at.channels; ++c) to[c] += from[c];
+bool forward_bricks(const Step& s, const float* packed, const Bricks& bricks, const Mask& mask,
+                    std::int64_t begin, std::int64_t end, float* memory, float* out) {
+    const Layout at(s);
+    const Weights weights(at, packed);
+    const States states = states_of(s, at, weights);
+    Scratch scratch(memory);
+    const Matrix z = scratch.matrix(at.z_stride), hidden = scratch.matrix(at.hidden_stride);
+    float* const around = memory + sizes(s).scratch;
+    std::int32_t rows[BLOCK], chosen[MOST_CHOSEN];
+    int waiting = 0;  // cells whose z is there, of whatever bricks
+    for (std::int64_t first = begin, last; first < end; first = last) {
+        const std::int64_t brick = bricks.places[first] / HALOED, lowest = brick * HALOED;
+        if (bricks.places[first] < 0 || brick >= bricks.count) return false;
+        const std::int64_t furthest = first + BRICK < end ? first + BRICK : end;
+        for (last = first + 1; last < furthest; ++last)
+            if (std::uint64_t(bricks.places[last] - lowest) >= HALOED) break;
+        std::memcpy(out + first * at.channels, s.state + first * at.channels,
+                    std::size_t(last - first) * at.channels * sizeof(float));
+        const int count = choose(mask, first, last, chosen);
+        if (count == 0) continue;
+        const std::int32_t* const next = bricks.around + (lowest + HALOED) % (bricks.count * HALOED);
+        const int portion = HALOED / count + 1;
+        if (!gather(states, s.cells, bricks.around + lowest, around)) return false;
+        for (int i = 0; i < count; ++i) {
+            const std::int64_t row = chosen[i], place = bricks.places[row] - lowest;
+            if (place < FARTHEST || place >= HALOED - FARTHEST) return false;
+            const float* const here = around + place * LANES;
+            perceive_cell(at, [&](int o) { return here + step_to(o) * LANES; }, HALOED * LANES,
+                          z.row(waiting));
+            append_priors(s, row, z.row(waiting) + at.filtered);
+            fetch(states, next, i * portion, (i + 1) * portion);
+            rows[waiting++] = std::int32_t(row);
+            if (waiting == BLOCK) {
+                add_change(at, weights, rows, BLOCK, z, hidden, out);
+                waiting = 0;
+            }
+        }
     }
+    add_change(at, weights, rows, waiting, z, hidden, out);
+    return true;
 }
 
 void backward(const Step& s, const float* packed, const Block& block, const float* gradient,
@@ -217,8 +275,8 @@ void backward(const Step& s, const float* packed, const Block& block, const floa
         };
     };
 
-    perceive_block(s, at, weights.tail, block, z);
-    hidden_block(at, weights, block, z, hidden);
+    perceive_block(s, at, weights, block, z);
+    hidden_block(at, weights, block.count, z, hidden);
     for (int i = 0; i < block.count; ++i) {
         const float* const from = gradient + std::int64_t(block.rows[i]) * at.channels;
         for (int c = 0; c < at.channels; ++c) to_change.row(i)[c] = number(from[c]);
@@ -245,11 +303,24 @@ void backward(const Step& s, const float* packed, const Block& block, const floa
             });
 }
 
+double multiply_adds(std::int64_t rounds) {
+    constexpr int CHAINS = REGISTERS == 32 ? 24 : 12;  // more than wait for one another
+    Vec sum[CHAINS] = {};
+    const Units half = (Units)(Vec{} + 0.5f);
+    for (std::int64_t round = 0; round < rounds; ++round)
+#pragma GCC unroll 24
+        for (int i = 0; i < CHAINS; ++i) sum[i] = chained(sum[i], half);
+    volatile float seen = 0;  // or nothing would have to be computed
+    for (const Vec& each : sum) seen = seen + each[0];
+    return 2.0 * double(rounds) * CHAINS * LANES * DEPTH;
+}
+
 #define TEXT(x) #x
 #define NAME(x) TEXT(x)
 
 }  // namespace
 
-extern const Kernel kernel = {NAME(VNCA_TARGET), DEPTH > 1, sizes, pack, forward, backward};
+extern const Kernel kernel = {NAME(VNCA_TARGET), DEPTH > 1, sizes, pack, forward, forward_bricks,
+                             backward, multiply_adds};
 
 }  // namespace vnca::VNCA_TARGET

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "mask.hpp"
+
 namespace vnca {
 
 constexpr int NEIGHBOURS = 27;
@@ -25,6 +27,15 @@ struct Step {
     int inputs() const { return FILTERS * channels + priors; }
 };
 
+// Where the cells of a step lie: in bricks of 8³, each with a layer of the cells around it.
+constexpr int HALO_EDGE = 10, HALOED = HALO_EDGE * HALO_EDGE * HALO_EDGE, BRICK = 512;
+constexpr int NEXT_X = HALO_EDGE * HALO_EDGE, NEXT_Y = HALO_EDGE;
+struct Bricks {
+    std::int64_t count;
+    const std::int32_t* around;  // [count, HALOED] rows of the state
+    const std::int32_t* places;  // [cells] where each cell lies in `around`, laid out flat
+};
+
 // Cells of one block and where their neighbours are.
 struct Block {
     int count;                                  // at most BLOCK
@@ -37,6 +48,7 @@ struct Block {
 struct Sizes {
     std::size_t packed;         // weights as the inner loops want them, shared by all threads
     std::size_t scratch;        // one thread's working memory
+    std::size_t brick;          // and what it takes more for bricks
     std::size_t first_rows;     // of the gradient of [W1 | b1]ᵀ, padded
     std::size_t second_rows;    // of the gradient of W2, padded
     std::size_t hidden;         // padded width of both
@@ -54,10 +66,19 @@ struct Kernel {
     // out[row] += the change of the row's cell.
     void (*forward)(const Step&, const float* packed, const Block&, float* scratch, float* out);
 
+    // Writes the rows of the cells [begin, end) to `out`, changed where the mask says so. False if something of the bricks is out of range: nothing is
+    // read or written through it.
+    bool (*forward_bricks)(const Step&, const float* packed, const Bricks&, const Mask&,
+                           std::int64_t begin, std::int64_t end, float* scratch, float* out);
+
     // Adds to `weights` the gradients of [W1 | b1]ᵀ and W2, and to `state` (rows given by the
     // block's slots) that of the cells' neighbourhoods.
     void (*backward)(const Step&, const float* packed, const Block&, const float* gradient,
                      float* scratch, float* weights, float* state);
+
+    // Nothing but multiply-adds of what is in registers; returns how many operations these were,
+    // two for each: what there is to be had.
+    double (*multiply_adds)(std::int64_t rounds);
 };
 
 // One for each instruction set that this build knows, fastest first.

@@ -45,8 +45,13 @@ struct InPanels {
 template <int Rows, int Width, class Finish>
 INLINE void tile(Left left, const Unit* right, std::size_t right_step, std::size_t depth,
                  const Finish& finish) {
+    // Rows by threes: three can be addressed from one register and the stride, and there are not
+    // enough registers for one a row.
+    constexpr int Bases = (Rows + 2) / 3;
     Vec sum[Rows][Width] = {};
-    const Unit* a = left.data;
+    const Unit* a[Bases];
+#pragma GCC unroll 4
+    for (int base = 0; base < Bases; ++base) a[base] = left.data + 3 * base * left.row;
     for (std::size_t k = 0; k < depth; ++k) {
         Units b[Width];
 #pragma GCC unroll 4
@@ -55,8 +60,9 @@ INLINE void tile(Left left, const Unit* right, std::size_t right_step, std::size
         for (int i = 0; i < Rows; ++i)
 #pragma GCC unroll 4
             for (int j = 0; j < Width; ++j)
-                sum[i][j] = multiply_add(a[i * left.row], b[j], sum[i][j]);
-        a += left.step;
+                sum[i][j] = multiply_add(a[i / 3][i % 3 * left.row], b[j], sum[i][j]);
+#pragma GCC unroll 4
+        for (int base = 0; base < Bases; ++base) a[base] += left.step;
         right += right_step;
     }
 #pragma GCC unroll 12

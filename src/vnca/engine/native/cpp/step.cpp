@@ -139,28 +139,51 @@ const Kernel* const* kernels() {
     return found.data();
 }
 
-bool forward(const Kernel& kernel, const Step& step, Rows rows, float* out, int threads) {
+namespace {
+
+// Calls write(begin, end, packed, scratch) for ranges of cells; false if one goes wrong.
+template <class Write>
+bool each_range(const Kernel& kernel, const Step& step, float* out, int threads,
+                const Write& write) {
     const Sizes sizes = kernel.sizes(step);
     const Ranges ranges(step.cells);
     threads = std::max(1, std::min(threads, ranges.count));
     Floats packed(sizes.packed);
     kernel.pack(step, packed.data());
     std::vector<Floats> scratch;
-    for (int t = 0; t < threads; ++t) scratch.emplace_back(sizes.scratch);
+    for (int t = 0; t < threads; ++t) scratch.emplace_back(sizes.scratch + sizes.brick);
     std::atomic<bool> valid = true;
 
     ThreadPool::of_process().run(ranges.count, threads, [&](int range, int worker) {
-        const std::int64_t begin = ranges.begin(range), end = ranges.end(range);
-        std::memcpy(out + begin * step.channels, step.state + begin * step.channels,
-                    (end - begin) * step.channels * sizeof(float));
-        const auto visit = [&](const Block& block) {
-            kernel.forward(step, packed.data(), block, scratch[worker].data(), out);
-        };
-        if (!each_block(step, rows, begin, end, visit)) valid = false;
+        if (!write(ranges.begin(range), ranges.end(range), packed.data(), scratch[worker].data()))
+            valid = false;
     });
     std::memcpy(out + step.cells * step.channels, step.state + step.cells * step.channels,
                 step.channels * sizeof(float));
     return valid;
+}
+
+}  // namespace
+
+bool forward(const Kernel& kernel, const Step& step, Rows rows, float* out, int threads) {
+    return each_range(kernel, step, out, threads,
+                      [&](std::int64_t begin, std::int64_t end, const float* packed, float* scratch) {
+                          std::memcpy(out + begin * step.channels,
+                                      step.state + begin * step.channels,
+                                      (end - begin) * step.channels * sizeof(float));
+                          return each_block(step, rows, begin, end, [&](const Block& block) {
+                              kernel.forward(step, packed, block, scratch, out);
+                          });
+                      });
+}
+
+bool forward(const Kernel& kernel, const Step& step, const Bricks& bricks, const Mask& mask,
+             float* out, int threads) {
+    return each_range(kernel, step, out, threads,
+                      [&](std::int64_t begin, std::int64_t end, const float* packed, float* scratch) {
+                          return kernel.forward_bricks(step, packed, bricks, mask, begin, end,
+                                                       scratch, out);
+                      });
 }
 
 bool backward(const Kernel& kernel, const Step& step, Rows rows, const float* gradient,

@@ -19,10 +19,12 @@ struct Gradients {
     float *state, *first, *bias, *second;
 };
 
-// Both return false, leaving their output undefined, if a neighbour of one of the rows lies
-// outside [0, cells]; they never read or write through such an index. They throw where there is
+// All return false, leaving their output undefined, if a neighbour of one of the rows lies
+// outside [0, cells], or a cell outside its brick; they never read or write through such an index. They throw where there is
 // not enough memory.
 bool forward(const Kernel&, const Step&, Rows, float* out, int threads);
+// The same with the neighbours given by bricks, for the cells that a mask chooses.
+bool forward(const Kernel&, const Step&, const Bricks&, const Mask&, float* out, int threads);
 bool backward(const Kernel&, const Step&, Rows, const float* gradient, Gradients, int threads);
 
 }  // namespace vnca

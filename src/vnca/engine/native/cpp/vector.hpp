@@ -42,6 +42,20 @@ typedef float Vec __attribute__((vector_size(LANES * sizeof(float))));
 INLINE Vec load(const float* from) { return load_as<Vec>(from); }
 INLINE void store(float* to, Vec v) { std::memcpy(to, &v, sizeof v); }
 
+// Adds the first `count` floats of a vector to what there is.
+INLINE void add_first(float* to, Vec v, int count) {
+    if (count >= LANES) return store(to, load(to) + v);
+    typedef float Four __attribute__((vector_size(4 * sizeof(float))));
+    float values[LANES];
+    store(values, v);
+    int c = 0;
+    for (; c + 4 <= count; c += 4) {
+        const Four sum = load_as<Four>(to + c) + load_as<Four>(values + c);
+        std::memcpy(to + c, &sum, sizeof sum);
+    }
+    for (; c < count; ++c) to[c] += values[c];
+}
+
 constexpr std::size_t round_up(std::size_t x, std::size_t to) { return (x + to - 1) / to * to; }
 
 // Products multiply numbers, float or bfloat16, and sum up floats. DEPTH numbers that follow one
@@ -71,6 +85,11 @@ INLINE Vec multiply_add(Unit a, Units b, Vec sum) {
     return (Vec)_mm512_dpbf16_ps((__m512)sum, (__m512bh)(a + Units{}), (__m512bh)b);
 }
 
+// A multiply-add that waits for the one before it, and of which nothing can be done beforehand.
+INLINE Vec chained(Vec sum, Units by) {
+    return (Vec)_mm512_dpbf16_ps((__m512)sum, (__m512bh)by, (__m512bh)by);
+}
+
 // Numbers in rows, `count` of them in use, put into `room` as units across the rows, for products
 // along them. A row of units takes DEPTH strides.
 INLINE const Unit* interleave(const Unit* rows, std::size_t stride, int count, int width,
@@ -94,6 +113,7 @@ INLINE Number number(float x) { return x; }
 INLINE void put(Number* to, Vec v) { store(to, v); }
 INLINE Vec get(const Number* from) { return load(from); }
 INLINE Vec multiply_add(Unit a, Units b, Vec sum) { return a * b + sum; }
+INLINE Vec chained(Vec sum, Units by) { return sum * by + by; }
 
 // Units of one number are across the rows as they are along them.
 INLINE const Unit* interleave(const Unit* rows, std::size_t, int, int, Unit*) { return rows; }
