@@ -271,12 +271,13 @@ class Roll:
         done = state.steps_done + warmup + self.steps_per_frame
         # What they begin with has no name here, or it would be kept to the last step.
         values = session.run(
-            session.upload(self._begun(domain, smoke, state)), range(state.steps_done, done)
+            session.upload(self._begun(ready, state)), range(state.steps_done, done)
         )
-        return RollState(domain.cells, session.read(values), done, smoke.frame)
+        return RollState(domain.cells, session.read(values), done, ready.smoke.frame)
 
-    def _begun(self, domain: Domain, smoke: Volume, state: RollState) -> FloatArray:
+    def _begun(self, ready: Ready, state: RollState) -> FloatArray:
         """What the cells of a frame begin with, of the state that the one before it left."""
+        smoke, domain = ready.smoke, ready.domain
         if len(state.cells) == 0:
             return domain.seed(self.rule.config.channels)
         before = Domain(state.cells, domain.box)
