@@ -13,6 +13,7 @@ RANKS = {
     "engine": 1, "simulation": 1,
     "rule": 2,
     "io": 3, "rendering": 3, "features": 3,
+    "direction": 3.5,
     "losses": 4, "painting": 4,
     "meshes": 5,
     "training": 6,
@@ -20,7 +21,7 @@ RANKS = {
     "recipe": 8,
     "cli": 9, "__main__": 10,
 }  # fmt: skip
-WITHOUT_TORCH = {"core", "rule", "io", "simulation", "painting"}
+WITHOUT_TORCH = {"core", "rule", "io", "simulation", "direction", "painting"}
 BACKENDS_WITH_TORCH = (
     "tensors.py",
     "reference/",

@@ -10,15 +10,21 @@ Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from vnca.core import Box, FloatArray, IntArray
+from vnca.core import AnyArray, Box, FloatArray, IntArray
 from vnca.core.errors import OptionError
 from vnca.core.field import Field
 from vnca.core.volume import Volume, dense, field_of
-from vnca.engine import Compute, open_session
+from vnca.direction import Carried, Direction, Inputs, Moment
+from vnca.direction.carried import carry
+from vnca.direction.colour import Editing
+from vnca.direction.mixing import Answer, Parts, layered, per_colour
+from vnca.direction.silhouette import of_mass
+from vnca.direction.values import Constant
+from vnca.engine import Compute, Session, open_session
 from vnca.engine.domain import Domain, DomainKind
 from vnca.io.smoke_format import on_one_lattice
 from vnca.io.velocity import extrapolated
@@ -35,30 +41,21 @@ from vnca.rule.paint import (
 
 
 @dataclass(frozen=True)
-class StylizeConfig:
-    """How a rule is rolled over a sequence, and how strongly it shows."""
+class StylizeConfig(Direction):
+    """How a rule is rolled over a sequence, and how it shows."""
 
-    steps_per_frame: int | None = None
-    """Steps of the automaton between two frames; as many as in training unless given. On a grid K
-    times as fine they are K times as many, given or not."""
     warmup: int = 64
     """Steps on the first frame before it is painted."""
     domain: DomainKind | None = None
     """Which cells are active: those near the smoke (active) or all of its box; as in training
     unless given."""
-    strength: float = 1.0
-    """Colour of the painting, from 0 (white smoke) to 1."""
-    density_strength: float = 1.0
-    """How much the painting changes the density, from 0 (not at all) to 1."""
     seed: int = 0
     """Same seed, same machine, same painting."""
 
     def __post_init__(self) -> None:
-        if self.warmup < 0 or (self.steps_per_frame is not None and self.steps_per_frame < 0):
-            raise OptionError("`steps_per_frame` and `warmup` must not be negative")
-        for name in ("strength", "density_strength"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise OptionError(f"`{name}` {getattr(self, name)}: must be from 0 to 1")
+        super().__post_init__()
+        if self.warmup < 0:
+            raise OptionError("`warmup` must not be negative")
 
 
 UNPAINTED = 1.0
@@ -77,11 +74,15 @@ class RollState:
             first frame and after one without smoke.
         values: `[n + 1, C]`, their state and a last row of zeros.
         steps_done: Steps since the sequence began, by which the next ones are numbered.
+        carried: What goes along with the smoke beside it, where anything does.
+        layers: What the rules of further layers left, of each its own.
     """
 
     cells: IntArray
     values: FloatArray
     steps_done: int = 0
+    carried: Carried | None = None
+    layers: tuple["RollState", ...] = ()
 
     @classmethod
     def empty(cls, channels: int, steps_done: int = 0) -> "RollState":
@@ -103,6 +104,7 @@ class Painting:
             white farther away.
         state: What it leaves to the next frame.
         coarse: The frame on the grid of the automaton; None where that is not known.
+        emission: The light that it gives, linear RGB `[x, y, z, 3]`, where any was asked for.
     """
 
     smoke: Volume
@@ -110,15 +112,22 @@ class Painting:
     colour: FloatArray
     state: RollState
     coarse: Volume | None = None
+    emission: Field | None = None
 
     @classmethod
     def of_fields(
-        cls, smoke: Volume, density: Field, colour: Field, state: RollState, coarse: Volume
+        cls,
+        smoke: Volume,
+        density: Field,
+        colour: Field,
+        state: RollState,
+        coarse: Volume,
+        emission: Field | None = None,
     ) -> "Painting":
         """A painting given by where there is smoke and colour."""
         painted: Any = density
         coloured: Any = colour
-        return cls(smoke, painted, coloured, state, coarse)
+        return cls(smoke, painted, coloured, state, coarse, emission)
 
     @cached_property
     def density_field(self) -> Field:
@@ -129,14 +138,6 @@ class Painting:
     def colour_field(self) -> Field:
         """The colour where it is not white."""
         return field_of(self, "colour", self.smoke.origin, outside=UNPAINTED)
-
-
-class _Parts(NamedTuple):
-    """What is painted: cells `[m, 3]`, their linear RGB `[m, 3]`, factors `[m]` of density."""
-
-    at: IntArray
-    colour: FloatArray
-    factors: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +154,9 @@ class Roll:
         grid: How many times as fine as the grid of the smoke the automaton's is.
         finer: How many times as fine as the automaton's the grid of the painting is; what is there
             between the cells, the decoder says.
+        layers: The rules of further layers, in the order of `config.layers`.
+        inputs: What the direction of `config` takes beside the smoke.
+        editing: What it does with colours as a whole.
     """
 
     rule: Rule
@@ -162,12 +166,18 @@ class Roll:
     colour_dilation: int = COLOUR_DILATION
     grid: int = 1
     finer: int = 1
+    layers: tuple["Roll", ...] = ()
+    inputs: Inputs = field(default_factory=Inputs)
+    editing: Editing = field(default_factory=Editing)
 
     @property
-    def steps_per_frame(self) -> int:
-        """Those asked for, or else those of training."""
-        asked = self.config.steps_per_frame
-        return self.rule.config.steps_per_frame if asked is None else asked
+    def steps_per_frame(self) -> int | str:
+        """Those asked for, or else those of training; as text where they are no number."""
+        asked = self.config.values["steps_per_frame"]
+        if asked is None:
+            return self.rule.config.steps_per_frame
+        constant = isinstance(asked, Constant)
+        return round(asked.number) * self.grid if constant else str(self.config.steps_per_frame)
 
     @property
     def domain_kind(self) -> DomainKind:
@@ -180,22 +190,22 @@ class Roll:
         A decoder is asked at so many more points; without one, the automaton runs on a grid as
         fine.
         """
+        layers = tuple(layer.refined(factor) for layer in self.layers)
         if self.rule.decoder is not None:
-            return replace(self, finer=factor * self.finer)
-        asked = self.config.steps_per_frame
-        steps = None if asked is None else factor * asked
+            return replace(self, finer=factor * self.finer, layers=layers)
         return replace(
             self,
             rule=self.rule.refined(factor),
-            config=replace(self.config, steps_per_frame=steps),
             box=self.box.refined(factor),
             colour_dilation=self.colour_dilation * factor,
             grid=self.grid * factor,
+            layers=layers,
         )
 
     def start(self) -> RollState:
         """The state before the first frame."""
-        return RollState.empty(self.rule.config.channels)
+        layers = tuple(layer.start() for layer in self.layers)
+        return replace(RollState.empty(self.rule.config.channels), layers=layers)
 
     def paint(self, smoke: Volume, state: RollState) -> Painting:
         """The next frame, of the same lattice, from the state that the one before it left.
@@ -207,26 +217,58 @@ class Roll:
             smoke: On a grid as fine as the automaton's.
             state: What the frame before it left.
         """
-        domain = self._domain(smoke)
-        state = self._stepped(smoke, domain, state)
-        parts = self._parts(domain, state)
-        del domain  # its table of neighbours is the largest array there is
-        return self._shown(smoke, parts, state)
+        moment = self._moment(smoke, state.carried)
+        state, parts = self._stepped(smoke, state, moment)
+        return self._shown(moment, parts, replace(state, carried=moment.carried))
 
-    def _stepped(self, smoke: Volume, domain: Domain, state: RollState) -> RollState:
-        """The state after the steps of a frame."""
+    def _moment(self, smoke: Volume, carried: Carried | None) -> Moment:
+        """A frame as the direction is asked about it, and what smoke carried to it."""
+        threshold = SMOKE_THRESHOLD * self.rule.scales.density
+        moment = Moment(smoke, self.box, threshold, self.grid, self.inputs)
+        return replace(moment, carried=carry(carried, self.config.parts(), moment))
+
+    def _stepped(self, smoke: Volume, state: RollState, moment: Moment) -> tuple[RollState, Parts]:
+        """The state after the steps of a frame, and what is painted, layers over each other."""
+        before = state.layers
+        domain = self._domain(smoke)
+        state = self._advanced(smoke, domain, state, moment)
+        parts = self._parts(domain, state, moment)
+        del domain  # its table of neighbours is the largest array there is
+        layers = []
+        for number, (layer, left) in enumerate(zip(self.layers, before, strict=True)):
+            left, above = layer._stepped(smoke, left, moment)
+            layers.append(left)
+            share = self.config.share(number, moment, self._places(parts.at))
+            parts = layered(parts, above, share)
+        return replace(state, layers=tuple(layers)), parts
+
+    def _advanced(
+        self, smoke: Volume, domain: Domain, state: RollState, moment: Moment
+    ) -> RollState:
+        """The state of this rule alone after the steps of a frame."""
         rule, config = self.rule, self.config
         if len(domain) == 0:
             return RollState.empty(rule.config.channels, state.steps_done)
         warmup = config.warmup if len(state.cells) == 0 else 0
-        done = state.steps_done + warmup + self.steps_per_frame
+        done = state.steps_done + warmup
+        steps = self._steps(moment, domain)
+        fewest, most = int(np.min(steps)), int(np.max(steps))
         conditioning = priors(domain, smoke, rule)
         session = open_session(rule.automaton(config.seed), domain, conditioning, self.compute)
         # What they begin with has no name here, or it would be kept to the last step.
         values = session.run(
-            session.upload(self._begun(domain, state)), range(state.steps_done, done)
+            session.upload(self._begun(domain, state)), range(state.steps_done, done + fewest)
         )
-        return RollState(domain.cells, session.read(values), done)
+        for step in range(fewest, most):
+            values = _with_rest(session, values, done + step, rest=np.asarray(steps) <= step)
+        return RollState(domain.cells, session.read(values), done + most)
+
+    def _steps(self, moment: Moment, domain: Domain) -> AnyArray | int:
+        """How many steps the cells do, all as many or each its own, `[n]`."""
+        if self.config.steps_per_frame is None:
+            return self.rule.config.steps_per_frame
+        asked: Answer = self.config.value("steps_per_frame", moment, domain.cells)
+        return np.rint(asked).astype(int) * self.grid
 
     def _begun(self, domain: Domain, state: RollState) -> FloatArray:
         """What the cells of a frame begin with, of the state that the one before it left."""
@@ -234,45 +276,64 @@ class Roll:
             return domain.seed(self.rule.config.channels)
         return Domain(state.cells, domain.box).carry(state.values, domain)
 
-    def _shown(self, coarse: Volume, parts: _Parts, state: RollState) -> Painting:
+    def _places(self, at: IntArray) -> AnyArray:
+        """Where points of the grid of the painting lie, in index coordinates of the automaton's."""
+        return at if self.finer == 1 else (at + 0.5) / self.finer - 0.5
+
+    def _shown(self, moment: Moment, parts: Parts, state: RollState) -> Painting:
         """The frame as a state shows it, on the grid of the painting."""
+        config, coarse = self.config, moment.smoke
         smoke = coarse.refined(self.finer)
         box = smoke.box
         inside = ((parts.at >= box.lower) & (parts.at < box.upper)).all(axis=1)
         at, colour, factors = parts.at[inside], parts.colour[inside], parts.factors[inside]
-        painted = UNPAINTED + self.config.strength * (colour - UNPAINTED)
-        colour = Field.from_cells(at, painted, box, outside=UNPAINTED)
-        known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
-        colour, known = extrapolated(colour, known, self.colour_dilation * self.finer)
-        colour.values[~known.values] = UNPAINTED
+        places = self._places(at)
+        colour = config.coloured(colour, moment, places, self.editing)
+        strength = per_colour(config.value("strength", moment, places))
+        painted = UNPAINTED + strength * (colour - UNPAINTED)
+        colour = self._continued(at, painted, box, UNPAINTED)
+        factors = config.outlined(factors, moment, places)
         factors = Field.from_cells(at, factors, box, outside=1.0)
-        density = smoke.density_field
-        density = replace(density, values=density.values * factors.blocks(density.bricks))
-        colour = replace(colour, outside=UNPAINTED)
-        return Painting.of_fields(smoke, density, colour, state, coarse)
+        before = smoke.density_field
+        density = replace(before, values=before.values * factors.blocks(before.bricks))
+        if config.keep_mass:
+            density = replace(density, values=of_mass(density, before))
+        light = None
+        if config.burns:
+            light = self._continued(at, config.emission(moment, places), box, 0.0)
+        return Painting.of_fields(smoke, density, colour, state, coarse, light)
 
-    def _parts(self, domain: Domain, state: RollState) -> _Parts:
-        """What is painted.
+    def _continued(self, at: IntArray, values: FloatArray, box: Box, outside: float) -> Field:
+        """Vectors at points, going on for some cells around them; `outside` farther away."""
+        known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
+        field = Field.from_cells(at, values, box, outside=outside)
+        field, known = extrapolated(field, known, self.colour_dilation * self.finer)
+        field.values[~known.values] = outside
+        return replace(field, outside=outside)
+
+    def _parts(self, domain: Domain, state: RollState, moment: Moment) -> Parts:
+        """What is painted by this rule alone.
 
         Of a decoder, each is the mean over a part of a cell: what is finer than the grid of the
         painting would be grain on it.
         """
-        strength = self.config.density_strength
         if self.rule.decoder is None:
             cells = state.values[:-1]
+            strength = self.config.value("density_strength", moment, state.cells)
             factors = density_factors(cells, strength=strength)
-            return _Parts(state.cells, colours(cells), factors)
+            return Parts(state.cells, colours(cells), factors)
         between = Between(self.rule, self.compute.backend, threads=self.compute.threads)
         parts = self.finer
+        offsets = np.indices(3 * (parts,), np.int32).reshape(3, -1).T
+        at = (state.cells[:, None] * parts + offsets).reshape(-1, 3)
+        at = at.astype(np.int32, copy=False)
+        strength = self.config.value("density_strength", moment, self._places(at))
         colour = np.empty((len(domain), *3 * (parts,), 3), np.float32)
         factors = np.empty(colour.shape[:-1], np.float32)
         for some, seen in parts_of_cells(between, state.values, domain, parts):
             colour[some] = colour_means(seen)
-            factors[some] = density_means(seen, strength=strength)
-        offsets = np.indices(3 * (parts,), np.int32).reshape(3, -1).T
-        at = (state.cells[:, None] * parts + offsets).reshape(-1, 3)
-        at = at.astype(np.int32, copy=False)
-        return _Parts(at, colour.reshape(-1, 3), factors.reshape(-1))
+            factors[some] = density_means(seen, strength=_of_cells(strength, some, parts))
+        return Parts(at, colour.reshape(-1, 3), factors.reshape(-1))
 
     def _domain(self, smoke: Volume) -> Domain:
         """The active cells of a frame."""
@@ -288,6 +349,21 @@ class Roll:
     @cached_property
     def _whole_box(self) -> Domain:
         return Domain.filling(self.box.grown(self.rule.config.dilation))
+
+
+def _with_rest(session: Session, values: Any, number: int, *, rest: AnyArray) -> Any:
+    """A state after a step in which some cells do nothing, `[n]` of them or all."""
+    before = session.read(values).copy()
+    after = session.read(session.run(values, range(number, number + 1))).copy()
+    after[:-1][rest] = before[:-1][rest]
+    return session.upload(after)
+
+
+def _of_cells(answer: Answer, some: slice, parts: int) -> Any:
+    """An answer for all parts of cells, in some of the cells, beside the points in each part."""
+    if isinstance(answer, (int, float)):
+        return answer
+    return answer.reshape(-1, *3 * (parts, 1))[some]
 
 
 def stylize(
