@@ -46,8 +46,8 @@ class Direction:
     """What is asked of a painting; text in the place of a number says where, when, how much."""
 
     strength: Share = 1.0
-    """Colour of the painting, from 0 (white smoke) to 1; as all numbers of a direction also a mask,
-    keys over frames and more (docs/guide/direct.md), such as @mask or "1:0 24:1"."""
+    """Colour of the painting, from 0 (white smoke) to 1; or a mask, keys over frames, … as all
+    VALUEs (docs/guide/direct.md)."""
     density_strength: Share = 1.0
     """How much the painting changes the density, from 0 (not at all) to 1."""
     steps_per_frame: Annotated[Amount | None, Limits(0, 10_000)] = None
@@ -82,9 +82,9 @@ class Direction:
     keep_mass: bool = False
     """Keep as much smoke in all as there was."""
     masks: tuple[str, ...] = ()
-    """Values with a name, NAME=VALUE, which others call @NAME."""
+    """Masks, NAME=VALUE; others call them @NAME."""
     layers: tuple[str, ...] = ()
-    """Further styles or models over the first, STYLE=VALUE, from 0 (not seen) to 1."""
+    """Styles or models over the first, STYLE=VALUE."""
     missing: Missing = "stop"
     """Where a frame lacks a grid that a value asks for: stop, zero, or hold the one before."""
 

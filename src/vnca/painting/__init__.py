@@ -16,18 +16,16 @@ import numpy as np
 
 from vnca.core import AnyArray, Box, FloatArray, IntArray
 from vnca.core.errors import OptionError
-from vnca.core.field import Field
-from vnca.core.volume import Volume, dense, field_of
+from vnca.core.volume import Volume
 from vnca.direction import Carried, Direction, Inputs, Moment
 from vnca.direction.carried import carry
 from vnca.direction.colour import Editing
-from vnca.direction.mixing import Answer, Parts, layered, per_colour
-from vnca.direction.silhouette import of_mass
+from vnca.direction.mixing import Answer, Parts, layered
 from vnca.direction.values import Constant
 from vnca.engine import Compute, Session, open_session
 from vnca.engine.domain import Domain, DomainKind
 from vnca.io.smoke_format import on_one_lattice
-from vnca.io.velocity import extrapolated
+from vnca.painting.shown import COLOUR_DILATION, Painting, composed
 from vnca.rule import SMOKE_THRESHOLD, Rule
 from vnca.rule.conditioning import priors
 from vnca.rule.paint import (
@@ -58,13 +56,6 @@ class StylizeConfig(Direction):
             raise OptionError("`warmup` must not be negative")
 
 
-UNPAINTED = 1.0
-"""Linear colour of smoke far from all that the rule paints: white."""
-COLOUR_DILATION = 3
-"""How many cells beyond the active ones their colour goes on, so that faint smoke is no pale seam
-where a renderer interpolates it."""
-
-
 @dataclass(frozen=True, eq=False)
 class RollState:
     """What a frame leaves to the next: all it takes to go on from there.
@@ -89,55 +80,6 @@ class RollState:
         """That of nothing painted yet."""
         cells = np.zeros((0, 3), dtype=np.int32)
         return cls(cells, np.zeros((1, channels), dtype=np.float32), steps_done)
-
-
-@dense("density", "colour", what=lambda painting: f"frame {painting.smoke.frame}")
-@dataclass(frozen=True, eq=False)
-class Painting:
-    """One painted frame, on the same cells as its smoke.
-
-    Attributes:
-        smoke: The frame as it was read, on the grid of the painting.
-        density: `[x, y, z]`, painted, in the units of the file; the array is made when it is asked
-            for, as the smoke's is.
-        colour: Likewise, linear RGB `[x, y, z, 3]`; beside the active cells continued from them,
-            white farther away.
-        state: What it leaves to the next frame.
-        coarse: The frame on the grid of the automaton; None where that is not known.
-        emission: The light that it gives, linear RGB `[x, y, z, 3]`, where any was asked for.
-    """
-
-    smoke: Volume
-    density: FloatArray
-    colour: FloatArray
-    state: RollState
-    coarse: Volume | None = None
-    emission: Field | None = None
-
-    @classmethod
-    def of_fields(
-        cls,
-        smoke: Volume,
-        density: Field,
-        colour: Field,
-        state: RollState,
-        coarse: Volume,
-        emission: Field | None = None,
-    ) -> "Painting":
-        """A painting given by where there is smoke and colour."""
-        painted: Any = density
-        coloured: Any = colour
-        return cls(smoke, painted, coloured, state, coarse, emission)
-
-    @cached_property
-    def density_field(self) -> Field:
-        """The density where there is any."""
-        return field_of(self, "density", self.smoke.origin)
-
-    @cached_property
-    def colour_field(self) -> Field:
-        """The colour where it is not white."""
-        return field_of(self, "colour", self.smoke.origin, outside=UNPAINTED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +161,8 @@ class Roll:
         """
         moment = self._moment(smoke, state.carried)
         state, parts = self._stepped(smoke, state, moment)
-        return self._shown(moment, parts, replace(state, carried=moment.carried))
+        state = replace(state, carried=moment.carried)
+        return self._painting(moment, parts, state)
 
     def _moment(self, smoke: Volume, carried: Carried | None) -> Moment:
         """A frame as the direction is asked about it, and what smoke carried to it."""
@@ -280,36 +223,14 @@ class Roll:
         """Where points of the grid of the painting lie, in index coordinates of the automaton's."""
         return at if self.finer == 1 else (at + 0.5) / self.finer - 0.5
 
-    def _shown(self, moment: Moment, parts: Parts, state: RollState) -> Painting:
+    def _painting(self, moment: Moment, parts: Parts, state: RollState) -> Painting:
         """The frame as a state shows it, on the grid of the painting."""
-        config, coarse = self.config, moment.smoke
-        smoke = coarse.refined(self.finer)
-        box = smoke.box
-        inside = ((parts.at >= box.lower) & (parts.at < box.upper)).all(axis=1)
-        at, colour, factors = parts.at[inside], parts.colour[inside], parts.factors[inside]
-        places = self._places(at)
-        colour = config.coloured(colour, moment, places, self.editing)
-        strength = per_colour(config.value("strength", moment, places))
-        painted = UNPAINTED + strength * (colour - UNPAINTED)
-        colour = self._continued(at, painted, box, UNPAINTED)
-        factors = config.outlined(factors, moment, places)
-        factors = Field.from_cells(at, factors, box, outside=1.0)
-        before = smoke.density_field
-        density = replace(before, values=before.values * factors.blocks(before.bricks))
-        if config.keep_mass:
-            density = replace(density, values=of_mass(density, before))
-        light = None
-        if config.burns:
-            light = self._continued(at, config.emission(moment, places), box, 0.0)
-        return Painting.of_fields(smoke, density, colour, state, coarse, light)
-
-    def _continued(self, at: IntArray, values: FloatArray, box: Box, outside: float) -> Field:
-        """Vectors at points, going on for some cells around them; `outside` farther away."""
-        known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
-        field = Field.from_cells(at, values, box, outside=outside)
-        field, known = extrapolated(field, known, self.colour_dilation * self.finer)
-        field.values[~known.values] = outside
-        return replace(field, outside=outside)
+        smoke = moment.smoke.refined(self.finer)
+        reach = self.colour_dilation * self.finer
+        density, colour, light = composed(
+            smoke, parts, self.config, moment, self._places, editing=self.editing, reach=reach
+        )
+        return Painting.of_fields(smoke, density, colour, state, moment.smoke, light)
 
     def _parts(self, domain: Domain, state: RollState, moment: Moment) -> Parts:
         """What is painted by this rule alone.
@@ -366,6 +287,19 @@ def _of_cells(answer: Answer, some: slice, parts: int) -> Any:
     return answer.reshape(-1, *3 * (parts, 1))[some]
 
 
+def painted(frames: Iterable[Volume], roll: Roll) -> Iterator[Painting]:
+    """Paint a sequence frame by frame, on the lattice of the first that has smoke.
+
+    Raises:
+        GridError: If its cells are not cubic, or a frame can have no place on them.
+    """
+    state = roll.start()
+    for smoke in on_one_lattice(frames):
+        painting = roll.paint(smoke.refined(roll.grid), state)
+        state = painting.state
+        yield painting
+
+
 def stylize(
     frames: Iterable[Volume],
     rule: Rule,
@@ -385,9 +319,4 @@ def stylize(
     Raises:
         GridError: If its cells are not cubic, or a frame can have no place on them.
     """
-    roll = Roll(rule, config, box, compute or Compute()).refined(refine)
-    state = roll.start()
-    for smoke in on_one_lattice(frames):
-        painting = roll.paint(smoke.refined(roll.grid), state)
-        state = painting.state
-        yield painting
+    return painted(frames, Roll(rule, config, box, compute or Compute()).refined(refine))

@@ -263,6 +263,7 @@ class Painter:
             refine=self.refine,
             provenance=self._provenance(read),
             file=read.file,
+            emission=painting.emission,
         )
         return painting.state
 

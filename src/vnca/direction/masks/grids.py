@@ -1,6 +1,7 @@
 """Grids of numbers as values: of the smoke's files, or of others."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vnca.core import AnyArray
-from vnca.core.errors import GridError, SequenceError
+from vnca.core.errors import FileFormatError, GridError, SequenceError
 from vnca.core.field import Field
 from vnca.core.files import existing_file
 from vnca.direction.mixing import Answer
@@ -76,6 +77,8 @@ class Grid(Value):
     def at(self, moment: Moment, places: AnyArray) -> Answer:
         """See `Value.at`."""
         smoke = moment.smoke
+        if not len(places):
+            return 0.0
         if self.name in smoke.named_fields:
             held = smoke.named_fields[self.name]
             if held.values.ndim > 4:
@@ -107,6 +110,8 @@ class FileGrid(Value):
 
     def at(self, moment: Moment, places: AnyArray) -> Answer:
         """See `Value.at`."""
+        if not len(places):
+            return 0.0
         stored = _stored(moment.inputs, moment.frame, self._paths(moment.inputs), self.name)
         return 0.0 if stored is None else stored.at(moment, places)
 
@@ -197,24 +202,25 @@ def _header(named: Mapping[str, GridHeader], name: str) -> GridHeader | None:
 
 
 def _require(inputs: Inputs, paths: Paths, name: str) -> None:
-    there, lacking = 0, None
-    for path in paths.values():
-        if path.suffix.lower() != _VDB:
-            lacking = lacking or path
-            continue
-        with open_vdb(path) as file:
-            header = _header(file.grids, name)
-            if header is not None and header.value_type.startswith("vec"):
-                raise GridError(f"{path}: grid {name!r} holds vectors, expected numbers")
-            is_empty = header is None or (header.box is not None and header.box.is_empty)
-            listed = file.listed()
-        there += not is_empty
-        if is_empty and lacking is None:
-            lacking = path
-            if inputs.missing == "stop":
-                raise GridError(
-                    f"{path}: no grid {name!r} among {listed}, or one without values; name a mask "
-                    "with `masks`, or choose `missing` zero or hold"
-                )
-    if lacking is not None and not there:
-        raise GridError(f"{lacking}: no grid {name!r} with values, in this or any other frame")
+    lacking = [path for path in paths.values() if not _has(path, name)]
+    if lacking and inputs.missing == "stop":
+        raise GridError(
+            f"{lacking[0]}: no grid {name!r}, or one without values; name a mask with `masks`, or "
+            "choose `missing` zero or hold"
+        )
+    if lacking and len(lacking) == len(paths):
+        raise GridError(f"{lacking[0]}: no grid {name!r} with values, in this or any other frame")
+
+
+def _has(path: Path, name: str) -> bool:
+    """Whether a file has values of a grid, by its headers; what is broken painting tells."""
+    if path.suffix.lower() != _VDB:
+        return False
+    with suppress(FileFormatError), open_vdb(path) as file:
+        header = _header(file.grids, name)
+        if header is None:
+            return not file.grids  # a frame without smoke
+        if header.value_type.startswith("vec"):
+            raise GridError(f"{path}: grid {header.name!r} holds vectors, expected numbers")
+        return header.box is None or not header.box.is_empty
+    return True
