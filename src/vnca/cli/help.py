@@ -31,7 +31,7 @@ _SMOKE = ("velocity-units", "fps", "up-axis")
 _FILM = ("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background", "light")
 COMMON: Mapping[str, tuple[str, ...]] = {
     "paint": (
-        *("out", "style", "preset", "training-frame", "frames", "refine", "strength", "masks"),
+        *("out", "style", "preset", "frames", "refine", "strength", "masks"),
         *("layers", "seed", *_SMOKE, "device", "resume", "overwrite"),
     ),
     "train": (

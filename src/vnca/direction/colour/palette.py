@@ -12,6 +12,8 @@ COLOURS = 5
 _PIXELS, _ROUNDS = 4096, 40
 _LEAST_SPREAD = 0.05
 _FLOOR = 1e-4
+_APART = 0.08
+"""Colours nearer to each other are one."""
 
 
 def main_colours(picture: AnyArray, count: int = COLOURS) -> AnyArray:
@@ -47,7 +49,11 @@ def main_colours(picture: AnyArray, count: int = COLOURS) -> AnyArray:
             break
         found = np.array(means)
     sizes = np.bincount(of, minlength=len(found))
-    return found[np.argsort(-sizes, kind="stable")]
+    kept: list[AnyArray] = []
+    for centre in found[np.argsort(-sizes, kind="stable")]:
+        if all(np.linalg.norm(centre - other) >= _APART for other in kept):
+            kept.append(centre)
+    return np.array(kept)
 
 
 @dataclass(frozen=True, eq=False)
