@@ -205,8 +205,8 @@ class Direction:
         low, high = limits or NUMBERS[name]
         for number in [] if value is None else value.numbers():
             if not low <= number <= high:  # not-a-number is neither
-                told = "" if isinstance(given, (int, float)) else f" {number:g}:"
-                raise OptionError(f"`{name}` {given}:{told} must be from {low:g} to {high:g}")
+                shown = f"{given}: {number:g}" if isinstance(given, str) else f"{number:g}"
+                raise OptionError(f"`{name}` {shown}: must be from {low:g} to {high:g}")
 
 
 def _entries(option: str, texts: tuple[str, ...]) -> list[tuple[str, str]]:

@@ -1,0 +1,169 @@
+"""Paintings by a direction: layers, outlines, light, steps; going on after an end."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vnca
+from vnca.core.errors import GridError, OptionError
+from vnca.io import read_smoke
+from vnca.io.vdb import open_vdb
+from vnca.rule.model import Model, load_style
+
+Painted = Callable[..., list[dict[str, Any]]]
+RIGHT = "x:2.6..4"
+
+
+def test_a_share_of_a_layer_is_that_much_of_its_colour(painted: Painted, model: Path) -> None:
+    ink, density = load_style("ink"), Model.load(model).rule.scales.density
+    below, above = painted(), painted(replace(ink, rule=ink.rule.rescaled(density=density)))
+    mixed = painted(layers={"ink": 0.25})
+    for one, other, both in zip(below, above, mixed, strict=True):
+        np.testing.assert_allclose(both["Cd"], 0.75 * one["Cd"] + 0.25 * other["Cd"], atol=2e-3)
+    for one, whole in zip(above, painted(layers={"ink": 1}), strict=True):
+        np.testing.assert_array_equal(one["Cd"], whole["Cd"])
+    twice = painted(layers={"ink": 1, str(model): "1:0 3:1"})
+    np.testing.assert_array_equal(twice[0]["Cd"], above[0]["Cd"])
+    np.testing.assert_array_equal(twice[2]["Cd"], below[2]["Cd"])
+
+
+def test_masks_say_where(painted: Painted, smoke: Path) -> None:
+    (plain, *_), (half, *_) = painted(), painted(strength=f"hold {RIGHT}", hue="0")
+    volume = read_smoke(smoke / "ball_0001.vdb")
+    x = np.argwhere(volume.density > 0)[:, 0] * 0.5 + 0.5 * volume.origin[0]
+    assert len(x) == len(plain["Cd"])
+    np.testing.assert_array_equal(half["Cd"][x < 4], 1)
+    np.testing.assert_array_equal(half["Cd"][x > 4], plain["Cd"][x > 4])
+    np.testing.assert_array_equal(half["density"], plain["density"])
+
+
+def test_steps_may_differ_from_place_to_place(painted: Painted) -> None:
+    few, many, both = (painted(steps_per_frame=n) for n in (1, 4, "hold x:0..4->1..4"))
+    for one, other, mixed in zip(few, many, both, strict=True):
+        like_few = (mixed["Cd"] == one["Cd"]).all(axis=1).mean()
+        like_many = (mixed["Cd"] == other["Cd"]).all(axis=1).mean()
+        assert like_few > 0.1
+        assert like_many > 0.05
+
+
+def test_outline_is_kept_and_inside_is_painted(painted: Painted, read: Any, smoke: Path) -> None:
+    source = [read(path)["density"] for path in sorted(smoke.glob("*.vdb"))]
+    changes = {}
+    for silhouette in ("free", "soft", "keep"):
+        for before, frame in zip(source, painted(silhouette=silhouette), strict=True):
+            rim = before < 0.8
+            change = np.abs(frame["density"] / before - 1)
+            changes.setdefault(silhouette, []).append((change[rim].mean(), change[~rim].mean()))
+    free, soft, keep = (np.mean(each, axis=0) for each in changes.values())
+    assert free[0] > soft[0] > keep[0]
+    assert keep[0] < 0.2 * free[0]
+    assert keep[1] > 0.2 * free[1]
+
+
+def test_an_edge_moved_inwards_removes_smoke_and_mass_is_kept_where_asked(
+    painted: Painted, read: Any, smoke: Path
+) -> None:
+    before = read(smoke / "ball_0001.vdb")["density"]
+    (thin, *_), (kept, *_) = painted(edge=-1), painted(edge=-1, keep_mass=True)
+    assert (thin["density"] == 0).sum() > 50
+    assert thin["density"].sum() < 0.9 * before.sum()
+    assert kept["density"].sum() == pytest.approx(before.sum(), rel=1e-5)
+    np.testing.assert_array_equal(kept["density"] == 0, thin["density"] == 0)
+
+
+def test_fire_is_written_beside_the_colour(painted: Painted) -> None:
+    plain, (lit, *_) = painted(), painted(fire="density:0..1->300..1800")
+    np.testing.assert_array_equal(plain[0]["Cd"], lit["Cd"])
+    assert "emission" not in plain[0]
+    light = lit["emission"]
+    assert light.shape == lit["Cd"].shape
+    assert (light[:, 0] >= light[:, 2]).all()
+    assert light[:, 0].max() > 0.5
+    assert not light[lit["density"] < 0.02].any()
+
+
+@pytest.mark.parametrize("refine", [1, 2])
+def test_going_on_gives_the_same_files(
+    smoke: Path, model: Path, tmp_path: Path, refine: int
+) -> None:
+    options: dict[str, Any] = {
+        "backend": "numpy",
+        "warmup": 3,
+        "steps_per_frame": "1:2 3:3",
+        "refine": refine,
+        "layers": {str(model): "advected(z:0..6)"},
+        "strength": "age:0..4->1..0.5",
+    }
+    whole = [*vnca.stylize(model, smoke, out=tmp_path / "whole", **options)]
+    begun = vnca.stylize(model, smoke, out=tmp_path / "parts", **options)
+    next(begun)
+    begun.close()  # type: ignore[attr-defined]
+    rest = [*vnca.stylize(model, smoke, out=tmp_path / "parts", resume=True, **options)]
+    for one, other in zip(whole, rest, strict=True):
+        assert one.path is not None
+        assert other.path is not None
+        assert one.path.read_bytes() == other.path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [({"strength": "1:0 3:1"}, "`strength`"), ({"layers": {}}, "`layers`")],
+)
+def test_going_on_with_something_else_asked_is_refused(
+    smoke: Path, model: Path, tmp_path: Path, change: dict[str, Any], named: str
+) -> None:
+    options: dict[str, Any] = {"backend": "numpy", "warmup": 1, "steps_per_frame": 1}
+    options |= {"layers": {str(model): 0.5}, "strength": "1:0 3:0.5"}
+    begun = vnca.stylize(model, smoke, out=tmp_path / "out", **options)
+    next(begun)
+    begun.close()  # type: ignore[attr-defined]
+    with pytest.raises(OptionError, match=f"cannot go on, since {named} is another"):
+        [*vnca.stylize(model, smoke, out=tmp_path / "out", resume=True, **{**options, **change})]
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"strength": "@none"}, "ball_0001.vdb: no grid 'none'"),
+        ({"strength": "density * 3"}, "goes from .* to 3, expected 0 to 1; give it a range"),
+        ({"strength": 'picture("none.png")'}, "none.png: no such file"),
+        ({"strength": 'mesh("none.obj")'}, "none.obj: no such file"),
+        ({"strength": 'grid("none_####.vdb")'}, "none_####.vdb"),
+        ({"layers": {"none": 1}}, "`layers` none: no such file, nor a style of the library"),
+        ({"layers": {"ink": 2}}, "`layers.ink` 2: 2: must be from 0 to 1"),
+        ({"masks": {"a b": 1}}, "'a b' is no name"),
+        ({"masks": ["a"]}, "expected a name, an equals sign and a value"),
+        ({"recolour": ["1=red"]}, "expected OLD=NEW"),
+        ({"recolour": ["1=#ff0000"]}, "`recolour`: the model has no picture"),
+        ({"edge": 1}, "`edge` 1: must be from -8 to 0"),
+        ({"strength": float("nan")}, "`strength` nan: must be from 0 to 1"),
+    ],
+)
+def test_what_cannot_be_is_told_before_anything_is_painted(
+    painted: Painted, tmp_path: Path, options: dict[str, Any], why: str
+) -> None:
+    with pytest.raises(vnca.VncaError, match=why):
+        painted(**options)
+    assert not list(tmp_path.glob("painted*/*.vdb"))
+
+
+def test_volumes_in_memory_are_directed_too(model: Path, smoke: Path) -> None:
+    volumes = [read_smoke(path, frame=n) for n, path in enumerate(sorted(smoke.glob("*.vdb")), 1)]
+    options: dict[str, Any] = {"backend": "numpy", "warmup": 2, "steps_per_frame": 1}
+    plain = [frame.colour for frame in vnca.stylize(model, volumes, **options)]
+    faded = [frame.colour for frame in vnca.stylize(model, volumes, strength="1:0 3:1", **options)]
+    np.testing.assert_array_equal(faded[0], 1)
+    np.testing.assert_array_equal(faded[2], plain[2])
+    with pytest.raises(GridError, match="no grid 'm'"):
+        [*vnca.stylize(model, volumes, strength="@m", **options)]
+
+
+def test_light_and_density_keep_what_the_file_had(painted: Painted, tmp_path: Path) -> None:
+    painted(fire=1500, refine=2)
+    with open_vdb(next(tmp_path.glob("painted*/ball_0001.vdb"))) as file:
+        assert file.names == ("density", "velocity", "Cd", "emission")
+        assert file.read("emission").active_box() == file.read("Cd").active_box()
