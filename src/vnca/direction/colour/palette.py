@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vnca.core import AnyArray, FloatArray
+from vnca.core.colour import linear_to_srgb
 from vnca.direction.colour.oklab import from_oklab, oklab
 
 COLOURS = 5
@@ -54,6 +55,12 @@ def main_colours(picture: AnyArray, count: int = COLOURS) -> AnyArray:
         if all(np.linalg.norm(centre - other) >= _APART for other in kept):
             kept.append(centre)
     return np.array(kept)
+
+
+def codes(palette: AnyArray) -> list[str]:
+    """Colours `[k, 3]` in OKLab as texts such as #1b2a49."""
+    shown = np.rint(255 * linear_to_srgb(from_oklab(palette)).clip(0, 1)).astype(int)
+    return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in shown]
 
 
 @dataclass(frozen=True, eq=False)
