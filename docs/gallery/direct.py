@@ -26,7 +26,7 @@ CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "strength": (GLASS, ("--strength", 0.4)),
     "mask": (GLASS, ("--strength", "sphere(0.5,0.2,0.35, 0.2, soft=0.15)")),
     "ramp": (GLASS, ("--strength", "smooth height:0.2..0.6")),
-    "depth": (GLASS, ("--strength", "distance:0..3")),
+    "speed": (GLASS, ("--strength", "speed:0.3..1.5")),
     "picture": (GLASS, ("--strength", 'picture("{work}/stripes.png")')),
     "mesh": (GLASS, ("--strength", 'mesh("{work}/ring.obj", soft=0.05)')),
     "advected": (GLASS, ("--strength", "advected(smooth x:0.4..0.6)")),
@@ -41,9 +41,13 @@ CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "match": (FROST, ("--match", "{here}/smoke/harvest.webp")),
     "silhouette": (GLASS, ("--silhouette", "keep")),
     "edge": (GLASS, ("--edge", -1)),
-    "fire": (GLASS, ("--fire", "distance:0..6->500..1900")),
+    "fluff": (GLASS, ("--edge", 1)),
+    "fire": (GLASS, ("--fire", "height:0..0.7->2200..900")),
 }
 """The style, and the options of each."""
+THIN = ("--gamma", 0.4)
+SHOWN: dict[str, tuple[object, ...]] = {"density_strength": THIN, "silhouette": THIN}
+"""How both pictures are filmed where it is not as all others: through thin smoke, density is seen."""
 
 
 def main(folder: str) -> None:
@@ -63,8 +67,10 @@ def main(folder: str) -> None:
     ring.export(work / "ring.obj")
     for name, (style, options) in CONTROLS.items():
         filled = [str(each).format(work=work, here=HERE) for each in options]
-        light = ("--colour-grid", "emission", "--light", 0) if name == "fire" else ()
-        before, after = seen(style, work), seen(style, work, name, *filled, shown=light)
+        shown = SHOWN.get(name, ())
+        light = ("--colour-grid", "emission", "--light", 0) if name == "fire" else shown
+        before = seen(style, work, shown=shown)
+        after = seen(style, work, name, *filled, shown=light)
         gap = np.ones((SIDE, 4, 3), np.float32)
         sides = [read_image(before), gap, read_image(after)]
         write_image(PICTURES / f"{name}.webp", np.concatenate(sides, axis=1))
@@ -74,7 +80,8 @@ def seen(
     style: str, work: Path, name: str = "plain", *options: object, shown: tuple[object, ...] = ()
 ) -> Path:
     """A picture of the last frame as some options have it."""
-    out, picture = work / f"{style}_{name}", work / f"{style}_{name}.png"
+    out = work / f"{style}_{name}"
+    picture = work / f"{out.name}{'_thin' * (shown == THIN)}.png"
     last = out / "painted" / f"plume_{LAST:04d}.vdb"
     made(last, "paint", work / "smoke", "--style", style, "-o", out, *PAINTED, *options)
     # What is given later wins.

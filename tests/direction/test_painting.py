@@ -75,6 +75,32 @@ def test_an_edge_moved_inwards_removes_smoke_and_mass_is_kept_where_asked(
     np.testing.assert_array_equal(kept["density"] == 0, thin["density"] == 0)
 
 
+@pytest.mark.parametrize("refine", [1, 2])
+def test_an_edge_moved_outwards_adds_smoke_no_farther_than_that(
+    painted: Painted, smoke: Path, tmp_path: Path, refine: int
+) -> None:
+    painted(edge=1, density_strength=0, refine=refine)
+    source = read_smoke(smoke / "ball_0002.vdb")
+    fluff = read_smoke(next(tmp_path.glob("painted*/ball_0002.vdb")))
+    centre = (np.array(source.box.lower) + np.array(source.box.upper) - 1) / 2
+
+    def away(volume: Any) -> Any:
+        cells = np.argwhere(volume.density > 0.02) + volume.origin
+        cells = (cells + 0.5) / round(0.5 / volume.voxel_size[0]) - 0.5
+        return np.linalg.norm(cells - centre, axis=1)
+
+    before, after = away(source), away(fluff)
+    # In between cells there is smoke up to the next one.
+    assert before.max() + 0.6 < after.max() < before.max() + 2
+    inner = away(fluff) < 4
+    assert inner.sum() >= (before < 4).sum()
+    # It has a colour there, as all smoke has.
+    with open_vdb(next(tmp_path.glob("painted*/ball_0002.vdb"))) as file:
+        box = file.read("density").active_box()
+        density, colour = (file.read(name).to_dense(box)[0] for name in ("density", "Cd"))
+    assert (colour[density > 0] > 0).any(axis=-1).all()
+
+
 def test_fire_is_written_beside_the_colour(painted: Painted) -> None:
     plain, (lit, *_) = painted(), painted(fire="density:0..1->300..1800")
     np.testing.assert_array_equal(plain[0]["Cd"], lit["Cd"])
@@ -139,7 +165,7 @@ def test_going_on_with_something_else_asked_is_refused(
         ({"masks": ["a"]}, "expected a name, an equals sign and a value"),
         ({"recolour": ["1=red"]}, "expected OLD=NEW"),
         ({"recolour": ["1=#ff0000"]}, "`recolour`: the model has no picture"),
-        ({"edge": 1}, "`edge` 1: must be from -8 to 0"),
+        ({"edge": 4}, "`edge` 4: must be from -8 to 3"),
         ({"strength": float("nan")}, "`strength` nan: must be from 0 to 1"),
     ],
 )

@@ -117,8 +117,8 @@ def spelled_out(arguments: Sequence[str]) -> list[str]:
     return words
 
 
-_KEY = re.compile(r"-?\d+(\.\d+)?:[^.:\\/]")
-_BEFORE_KEY = re.compile(r"(linear|smooth|hold)$|((linear|smooth|hold) )?-?\d+(\.\d+)?:[^.:\\/]")
+_KEY = re.compile(r"-?\d+(\.\d+)?:[^:\\/]")
+_BEFORE_KEY = re.compile(r"(linear|smooth|hold)$|((linear|smooth|hold) )?-?\d+(\.\d+)?:[^:\\/]")
 
 
 def chosen(arguments: Sequence[str], option: str, default: str) -> str:

@@ -4,9 +4,10 @@ Numbers are told by themselves or by text (`grammar.py`); whoever paints asks a 
 at places of a `Moment`.
 """
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import GridError, OptionError
+from vnca.core.field import Field
 from vnca.direction.carried import Carried
 from vnca.direction.colour import Editing, require_exchange
 from vnca.direction.colour.fire import emission
@@ -21,8 +23,8 @@ from vnca.direction.colour.grading import graded
 from vnca.direction.grammar import parsed
 from vnca.direction.mixing import Answer, mixed, per_colour
 from vnca.direction.moment import Inputs, Missing, Moment
-from vnca.direction.silhouette import Silhouette, outlined
-from vnca.direction.values import Constant, Value
+from vnca.direction.silhouette import Silhouette, fluffed, outlined
+from vnca.direction.values import Constant, Keys, Value
 
 __all__ = ["Carried", "Direction", "Inputs", "Limits", "Moment"]
 
@@ -63,9 +65,9 @@ class Direction:
     """Stops by which its colours are brighter; each doubles them."""
     grading: Share = 1.0
     """How much of `recolour` and `match` is seen, from 0 to 1."""
-    edge: Annotated[Amount, Limits(-8, 0)] = 0.0
-    """Cells by which the outline of the smoke is moved inwards, below zero, as the painting draws
-    it."""
+    edge: Annotated[Amount, Limits(-8, 3)] = 0.0
+    """Cells by which the outline of the smoke is moved, as the painting draws it: below zero
+    inwards, above outwards."""
     fire: Annotated[Amount, Limits(0, 100_000)] = 0.0
     """Temperature in Kelvin, such as @temperature:0..1->300..2200: the light that it gives is
     written beside the colour, as the grid emission."""
@@ -182,6 +184,31 @@ class Direction:
         if self.silhouette == "free" and np.all(np.equal(edge, 0)):
             return factors
         return outlined(factors, moment.sampled(moment.depth, places), self.silhouette, edge)
+
+    @cached_property
+    def asks_for_places(self) -> bool:
+        """Whether anything may be another from place to place."""
+        even = all(isinstance(part, (Constant, Keys)) for part in self.parts())
+        outline = self.silhouette != "free" or self.values["edge"] != Constant(0.0)
+        return not even or outline
+
+    @property
+    def fluff(self) -> int:
+        """How many cells beyond the smoke there may be some, at most."""
+        edge = self.values["edge"]
+        return 0 if edge is None else math.ceil(2 * max(0.0, min(edge.most, NUMBERS["edge"].high)))
+
+    def fluffed(
+        self,
+        density: Field,
+        factors: Field,
+        moment: Moment,
+        places: Callable[[AnyArray], AnyArray],
+    ) -> Field:
+        """A density with its outline moved outwards where that is asked; see `silhouette.py`."""
+        if not self.fluff:
+            return density
+        return fluffed(density, factors, places, moment, partial(self.value, "edge", moment))
 
     @property
     def burns(self) -> bool:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from vnca.core import AnyArray, Box, FloatArray
+from vnca.core.bricks import EDGE, bricks_beside
 from vnca.core.camera import world_box
 from vnca.core.field import Field
 from vnca.core.volume import Volume
@@ -20,8 +21,8 @@ from vnca.io.smoke_format import UpAxis
 if TYPE_CHECKING:
     from vnca.direction.carried import Carried
 
-DEEPEST = 16
-"""Cells of the smoke up to which depth below its surface is counted."""
+DEEPEST, HIGHEST = 16, 6
+"""Cells of the smoke up to which depth below its surface is counted, and height above it."""
 # Of the world with y up, where each axis of the file is among ours.
 _FILE_AXES = {"z": [0, 1, 2], "y": [1, 2, 0]}
 Missing = Literal["stop", "zero", "hold"]
@@ -115,6 +116,17 @@ class Moment:
         # The surface lies between the last cell of smoke and the first without.
         below = np.maximum(found.values - np.float32(0.5), 0) / np.float32(self.fineness)
         return replace(found, values=below, outside=np.float32(0))
+
+    @cached_property
+    def signed_depth(self) -> Field:
+        """The same, below zero outside of the smoke, down to `HIGHEST` cells from it."""
+        inside, smoke, most = self.depth, self.is_smoke, (HIGHEST + 1) * self.fineness
+        bricks = bricks_beside(smoke.bricks, -(-most // EDGE))
+        away = np.where(smoke.blocks(bricks), np.float32(0), np.float32(np.inf))
+        wide = replace(smoke, bricks=bricks, values=away, outside=np.float32(np.inf))
+        above = np.maximum(distances(wide, most).values - np.float32(0.5), 0)
+        values = inside.blocks(bricks) - above / np.float32(self.fineness)
+        return replace(wide, values=values, outside=np.float32(-HIGHEST - 1))
 
     def sampled(self, field: Field, places: AnyArray) -> FloatArray:
         """Values `[n]` of a field of the smoke's cells, at cells or straight in between."""

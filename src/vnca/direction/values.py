@@ -51,6 +51,11 @@ class Value:
         """Numbers that it is known to be somewhere, before any frame is."""
         return iter(())
 
+    @property
+    def most(self) -> float:
+        """What it is at most anywhere; infinite where that is not known."""
+        return np.inf
+
 
 @dataclass(frozen=True)
 class Constant(Value):
@@ -61,6 +66,11 @@ class Constant(Value):
     def numbers(self) -> Iterator[float]:
         """See `Value.numbers`."""
         yield self.number
+
+    @property
+    def most(self) -> float:
+        """See `Value.most`."""
+        return self.number
 
     def at(self, moment: "Moment", places: AnyArray) -> Answer:
         """See `Value.at`."""
@@ -79,6 +89,11 @@ class Keys(Value):
         """See `Value.numbers`."""
         for value in self.values:
             yield from value.numbers()
+
+    @property
+    def most(self) -> float:
+        """See `Value.most`."""
+        return max(value.most for value in self.values)
 
     def at(self, moment: "Moment", places: AnyArray) -> Answer:
         """See `Value.at`."""
@@ -110,6 +125,11 @@ class Ramp(Value):
     def numbers(self) -> Iterator[float]:
         """See `Value.numbers`."""
         yield from (self.start, self.end)
+
+    @property
+    def most(self) -> float:
+        """See `Value.most`."""
+        return max(self.start, self.end)
 
     def at(self, moment: "Moment", places: AnyArray) -> Answer:
         """See `Value.at`."""

@@ -63,6 +63,7 @@ def write_painted(
     provenance: Provenance | None = None,
     file: VdbFile | None = None,
     emission: Field | None = None,
+    beyond: int = 0,
 ) -> None:
     """Write a frame of a sequence with new density and colour as a VDB file.
 
@@ -89,6 +90,7 @@ def write_painted(
         file: The source itself, if it is a VDB file and open already.
         emission: Light that the smoke gives, of the same cells as the colour, for a grid of its
             own.
+        beyond: How many of the painted cells around those of the source there may be smoke.
 
     Raises:
         OptionError: If a colour grid is named like the density, or two are named alike.
@@ -114,7 +116,7 @@ def write_painted(
     colours: dict[str, Field] = dict.fromkeys(colour_grids, colour)
     if emission is not None:
         colours[EMISSION] = emission
-    frame = _Painting(density, colours, lattice, up_axis_of(source, format), refine)
+    frame = _Painting(density, colours, lattice, up_axis_of(source, format), refine, beyond)
     told = provenance.metadata if provenance else {}
     if source.suffix.lower() != ".vdb":
         _paint_other(path, source, format, frame, told)
@@ -198,6 +200,7 @@ class _Painting:
         lattice: None for those of the source, along our axes.
         up: Which axis of the source's world points up.
         refine: How fine they are.
+        beyond: How many cells around those of the source there may be smoke.
     """
 
     density: Field
@@ -205,6 +208,7 @@ class _Painting:
     lattice: Lattice | None
     up: UpAxis
     refine: int
+    beyond: int
 
     def in_file(
         self, transform: Transform, density: Field, what: str
@@ -228,13 +232,15 @@ class _Painting:
         if painted.union(needed) != painted:
             raise ShapeError(f"{what}: smoke in {needed}, but only {painted} was painted")
         over = cells.refined(self.refine)
+        if not over.is_empty:
+            over = over.grown(self.beyond)
         source, target = (refined_transform(matrix, self.refine) for matrix in (world, ours))
         back = Placement.between(source, target, over, what).inverse
         # Of a colour that has several names there is one field.
         named = {id(colour): colour for colour in self.colours.values()}
         moved = {key: back.field(colour, over, "nearest") for key, colour in named.items()}
         colours = {name: moved[id(colour)] for name, colour in self.colours.items()}
-        if back.is_whole:
+        if back.is_whole or self.beyond:
             return back.field(self.density, over), colours
         positive = np.maximum(density.values.astype(np.float32), 0)
         plain = Volume.of_fields(replace(density, values=positive), None, world, 0)
@@ -245,11 +251,12 @@ class _Painting:
 
     def active(self, density: Field, of_file: Field, background: AnyArray | float = 0) -> Field:
         """Which cells to store; `of_file` are active in the file."""
-        if self.refine == 1:
+        if self.refine == 1 and not self.beyond:
             return of_file
         dense = replace(density, values=density.values != 0, outside=False).trimmed()
         # A cell that is not stored would not be empty.
-        return dense.union(divided(of_file, self.refine)) if background else dense
+        keeps = background or self.refine == 1
+        return dense.union(divided(of_file, self.refine)) if keeps else dense
 
     def transform(self, of_file: Transform) -> Transform:
         """That of the painted cells; `of_file` is that of the file's."""

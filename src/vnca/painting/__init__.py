@@ -122,6 +122,11 @@ class Roll:
         return round(asked.number) * self.grid if constant else str(self.config.steps_per_frame)
 
     @property
+    def beyond(self) -> int:
+        """How many cells of the painting beyond the smoke's box there may be smoke."""
+        return self.config.fluff * self.grid * self.finer
+
+    @property
     def domain_kind(self) -> DomainKind:
         """Which cells are active: as asked for, or else as in training."""
         return self.config.domain or self.rule.config.domain
@@ -219,13 +224,20 @@ class Roll:
             return domain.seed(self.rule.config.channels)
         return Domain(state.cells, domain.box).carry(state.values, domain)
 
-    def _places(self, at: IntArray) -> AnyArray:
-        """Where points of the grid of the painting lie, in index coordinates of the automaton's."""
-        return at if self.finer == 1 else (at + 0.5) / self.finer - 0.5
+    def _places(self, at: AnyArray) -> AnyArray:
+        """Where points of the grid of the painting lie, in index coordinates of the automaton's.
+
+        As they are where nobody looks.
+        """
+        if self.finer == 1 or not self.config.asks_for_places:
+            return at
+        return (at + 0.5) / self.finer - 0.5
 
     def _painting(self, moment: Moment, parts: Parts, state: RollState) -> Painting:
         """The frame as a state shows it, on the grid of the painting."""
         smoke = moment.smoke.refined(self.finer)
+        if self.config.fluff and not smoke.box.is_empty:
+            smoke = smoke.within(smoke.box.grown(self.beyond))
         reach = self.colour_dilation * self.finer
         density, colour, light = composed(
             smoke, parts, self.config, moment, self._places, editing=self.editing, reach=reach

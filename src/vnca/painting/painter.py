@@ -264,6 +264,7 @@ class Painter:
             provenance=self._provenance(read),
             file=read.file,
             emission=painting.emission,
+            beyond=self.roll.beyond,
         )
         return painting.state
 
