@@ -47,7 +47,7 @@ CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
 """The style, and the options of each."""
 THIN = ("--gamma", 0.4)
 SHOWN: dict[str, tuple[object, ...]] = {"density_strength": THIN, "silhouette": THIN}
-"""How both pictures are filmed where it is not as all others: through thin smoke, density is seen."""
+"""How both pictures are filmed where not as all others: density is seen in thin smoke."""
 
 
 def main(folder: str) -> None:

@@ -1,13 +1,14 @@
 """What changes nothing changes nothing, to the bit."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from vnca.io import read_smoke
+from vnca.io import read_smoke, write_smoke
 
 Painted = Callable[..., list[dict[str, Any]]]
 MODEL = Path(__file__).parents[1] / "data" / "painting" / "rule.safetensors"
@@ -32,6 +33,18 @@ def test_strength_0_leaves_density_and_white(
         source = read(smoke / "ball_0001.vdb")
         for name, values in source.items():
             np.testing.assert_array_equal(plain[name], values)
+
+
+def test_strength_0_leaves_the_density_of_uneven_voxels(
+    painted: Painted, smoke: Path, read: Any
+) -> None:
+    for path in smoke.glob("*.vdb"):
+        volume = read_smoke(path)
+        write_smoke(path, replace(volume, index_to_world=np.diag([0.5, 0.6, 0.8, 1.0])))
+    (plain, *_) = painted(strength=0, density_strength=0)
+    np.testing.assert_array_equal(plain["density"], read(smoke / "ball_0001.vdb")["density"])
+    (changed, *_) = painted(strength=0)
+    assert (changed["density"] != plain["density"]).mean() > 0.5
 
 
 @pytest.mark.parametrize(

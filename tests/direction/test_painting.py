@@ -1,5 +1,6 @@
 """Paintings by a direction: layers, outlines, light, steps; going on after an end."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 import vnca
 from vnca.core.errors import GridError, OptionError
 from vnca.io import read_smoke
+from vnca.io.provenance import read_provenance
 from vnca.io.vdb import open_vdb
 from vnca.rule.model import Model, load_style
 
@@ -188,8 +190,14 @@ def test_volumes_in_memory_are_directed_too(model: Path, smoke: Path) -> None:
         [*vnca.stylize(model, volumes, strength="@m", **options)]
 
 
-def test_light_and_density_keep_what_the_file_had(painted: Painted, tmp_path: Path) -> None:
-    painted(fire=1500, refine=2)
-    with open_vdb(next(tmp_path.glob("painted*/ball_0001.vdb"))) as file:
+def test_files_tell_what_was_asked_and_keep_what_they_had(painted: Painted, tmp_path: Path) -> None:
+    painted(fire=1500, refine=2, strength="1:0 3:1", masks={"low": "height:1..0"})
+    path = next(tmp_path.glob("painted*/ball_0001.vdb"))
+    told = read_provenance(path)
+    assert told is not None
+    assert told.facts["strength"] == "1:0 3:1"
+    further = json.loads(str(told.facts["direction"]))
+    assert further == {"fire": 1500, "masks": ["low=height:1..0"]}
+    with open_vdb(path) as file:
         assert file.names == ("density", "velocity", "Cd", "emission")
         assert file.read("emission").active_box() == file.read("Cd").active_box()

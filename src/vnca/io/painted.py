@@ -244,10 +244,11 @@ class _Painting:
             return back.field(self.density, over), colours
         positive = np.maximum(density.values.astype(np.float32), 0)
         plain = Volume.of_fields(replace(density, values=positive), None, world, 0)
-        factor = self._factor(on_lattice(plain, Lattice(ours), what).refined(self.refine))
-        factor = back.field(factor, over, "nearest")
+        change = self._change(on_lattice(plain, Lattice(ours), what).refined(self.refine))
+        # Of what is nothing everywhere, nothing comes of interpolation.
+        change = back.field(change, over, "nearest")
         finer = plain.refined(self.refine).density_field
-        return replace(finer, values=finer.values * factor.blocks(finer.bricks)), colours
+        return replace(finer, values=finer.values * (1 + change.blocks(finer.bricks))), colours
 
     def active(self, density: Field, of_file: Field, background: AnyArray | float = 0) -> Field:
         """Which cells to store; `of_file` are active in the file."""
@@ -264,12 +265,12 @@ class _Painting:
             return of_file
         return Transform.from_matrix(refined_transform(of_file.index_to_world, self.refine))
 
-    def _factor(self, plain: Volume) -> Field:
-        """What the painting multiplied the density by; 1 where there was none."""
+    def _change(self, plain: Volume) -> Field:
+        """What the painting multiplied the density by, less 1; 0 where there was none."""
         before = plain.density_field
         factor, painted = np.ones_like(before.values), self.density.blocks(before.bricks)
         np.divide(painted, before.values, out=factor, where=before.values > 0)
-        return Field(before.bricks, factor, self.density.box, outside=1.0)
+        return Field(before.bricks, factor - 1, self.density.box)
 
 
 def _with_rim(colours: Mapping[str, Field], active: Field) -> tuple[dict[str, Field], Field]:

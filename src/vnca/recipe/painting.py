@@ -1,6 +1,7 @@
 """Painting a sequence of smoke with a trained rule: from files to files, or in memory."""
 
 import dataclasses
+import json
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
@@ -97,6 +98,10 @@ class StylizeRun:
                 f"`colour_grid` {' '.join(self.colour_grid)}: each needs a name of its own, not "
                 f"that of another or of the density ({self.smoke.density_grid})"
             )
+
+
+_TOLD = ("strength", "density_strength", "steps_per_frame", "domain")
+"""What painted files tell one by one."""
 
 
 def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterator[Path | None]:
@@ -234,7 +239,10 @@ def _facts(options: StylizeRun, model: Model, roll: Roll) -> dict[str, str | int
     path = options.model.resolve()
     name = path.parent.name if path.name == MODEL_NAME else path.stem
     config = options.config
+    asked = changed_fields(config, StylizeConfig(warmup=config.warmup, seed=config.seed))
+    further = {n: recorded(config)[n] for n in asked if n not in _TOLD}
     return {
+        **({"direction": json.dumps(further)} if further else {}),
         "version": vnca.__version__,
         "model": name,
         "style": str(model.training.get("style", "")),
