@@ -26,7 +26,7 @@ CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "strength": (GLASS, ("--strength", 0.4)),
     "mask": (GLASS, ("--strength", "sphere(0.5,0.2,0.35, 0.2, soft=0.15)")),
     "ramp": (GLASS, ("--strength", "smooth height:0.2..0.6")),
-    "speed": (GLASS, ("--strength", "speed:0.3..1.5")),
+    "speed": (GLASS, ("--strength", "speed:0..0.6")),
     "picture": (GLASS, ("--strength", 'picture("{work}/stripes.png")')),
     "mesh": (GLASS, ("--strength", 'mesh("{work}/ring.obj", soft=0.05)')),
     "advected": (GLASS, ("--strength", "advected(smooth x:0.4..0.6)")),

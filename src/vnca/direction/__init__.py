@@ -201,14 +201,17 @@ class Direction:
     def fluffed(
         self,
         density: Field,
+        colour: Field,
         factors: Field,
         moment: Moment,
         places: Callable[[AnyArray], AnyArray],
-    ) -> Field:
-        """A density with its outline moved outwards where that is asked; see `silhouette.py`."""
+    ) -> tuple[Field, Field]:
+        """Density and colour with the outline moved outwards where asked; see `silhouette.py`."""
         if not self.fluff:
-            return density
-        return fluffed(density, factors, places, moment, partial(self.value, "edge", moment))
+            return density, colour
+        return fluffed(
+            density, colour, factors, places, moment, partial(self.value, "edge", moment)
+        )
 
     @property
     def burns(self) -> bool:

@@ -51,12 +51,13 @@ def outlined(
 
 def fluffed(
     density: Field,
+    colour: Field,
     factors: Field,
     places: Callable[[AnyArray], AnyArray],
     moment: Moment,
     edge: Callable[[AnyArray], Answer],
-) -> Field:
-    """A density whose outline is moved outwards.
+) -> tuple[Field, Field]:
+    """A density whose outline is moved outwards, and its colour.
 
     Twice as far where the painting thickens the smoke, not at all where it thins it. What a place
     holds then lay as far inside along the way to the surface; only places less than a cell below it
@@ -64,6 +65,7 @@ def fluffed(
 
     Args:
         density: Of the painting.
+        colour: Of the painting, in the same box.
         factors: What it was multiplied by.
         places: Where cells of it lie in index coordinates of the moment's smoke.
         moment: The frame.
@@ -72,21 +74,25 @@ def fluffed(
     signed = moment.signed_depth
     scale = float(np.linalg.norm(places(np.eye(3)[:1]) - places(np.zeros((1, 3)))))
     bricks = bricks_beside(density.bricks, math.ceil(HIGHEST * moment.fineness / scale / EDGE))
-    near = replace(density, bricks=bricks, values=density.blocks(bricks)).within(density.box)
-    cells = cells_at(near.bricks, np.ones(near.values.shape, bool))
-    inside = ((cells >= density.box.lower) & (cells < density.box.upper)).all(axis=1)
-    cells = cells[inside]
+    density, colour = (
+        replace(field, bricks=bricks, values=field.blocks(bricks)) for field in (density, colour)
+    )
+    cells = cells_at(bricks, np.ones((len(bricks), EDGE, EDGE, EDGE), bool))
+    box = density.box
+    cells = cells[((cells >= box.lower) & (cells < box.upper)).all(axis=1)]
     depth = between(signed, places(cells))
-    rim = (depth < 1) & (depth > -HIGHEST)
-    cells, depth = cells[rim], depth[rim]
+    cells = cells[(depth < 1) & (depth > -HIGHEST)]
     at = places(cells)
     thick = np.clip((factors.gather(cells) - 1) / np.float32(_STRONGEST), -1, 1)
     moved = np.maximum(edge(at), 0) * (1 + thick)
-    towards = _slope(signed, at)
-    origin = cells + (moved[:, None] * towards * (moment.fineness / scale))
-    values = np.maximum(density.gather(cells), between(density, origin))
-    near.values.reshape(-1)[near.find(cells)] = values
-    return near.trimmed()
+    origin = cells + (moved[:, None] * _slope(signed, at) * (moment.fineness / scale))
+    values = between(density, origin)
+    more = values > density.gather(cells)
+    cells, values, origin = cells[more], values[more], origin[more]
+    shown = between(colour, origin)
+    density.values.reshape(-1)[density.find(cells)] = values
+    colour.values.reshape(-1, 3)[colour.find(cells)] = shown
+    return density.trimmed(), colour
 
 
 def _slope(field: Field, at: AnyArray) -> AnyArray:

@@ -107,7 +107,7 @@ def composed(
     factors = Field.from_cells(at, factors, box, outside=1.0)
     before = smoke.density_field
     density = replace(before, values=before.values * factors.blocks(before.bricks))
-    density = direction.fluffed(density, factors, moment, places)
+    density, colour = direction.fluffed(density, colour, factors, moment, places)
     if direction.keep_mass:
         density = replace(density, values=of_mass(density, before))
     light = None
