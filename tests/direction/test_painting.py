@@ -51,11 +51,11 @@ def test_cells_of_fewer_steps_rest_while_others_go_on(painted: Painted, smoke: P
         painted(warmup=0, steps_per_frame=steps)[0]["Cd"] for steps in (3, "hold x:2..4->0..3")
     )
     grey = srgb_to_linear(np.float32(0.5))
-    np.testing.assert_array_equal(both[x < 4], grey)
+    np.testing.assert_allclose(both[x < 4], grey, rtol=1e-6)
     # A step sees one cell far: three cells from those that rest nothing is known of them.
     np.testing.assert_array_equal(both[x > 5.5], many[x > 5.5])
-    assert (many[x > 5.5] != grey).any()
-    assert (many[x < 4] != grey).any()
+    assert np.ptp(many[x > 5.5]) > 0.01
+    assert np.ptp(many[x < 4]) > 0.01
 
 
 def test_outline_is_kept_and_inside_is_painted(painted: Painted, read: Any, smoke: Path) -> None:

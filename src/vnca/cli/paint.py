@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from vnca.cli.options import parse
+from vnca.cli.options import is_given, parse
 from vnca.cli.terminal import Terminal, finishing
 from vnca.direction import Direction
 from vnca.direction.shot import SUFFIX as SHOT
@@ -16,6 +16,7 @@ from vnca.direction.shot import Shot
 from vnca.io import SmokeFormat
 from vnca.painting import StylizeConfig
 from vnca.recipe import paint, painting, recorded_smoke, rendering
+from vnca.recipe.film import FilmConfig
 from vnca.rule.model import Model
 
 
@@ -71,6 +72,8 @@ def _asked(shot: Shot | None, arguments: Sequence[str], smoke: SmokeFormat) -> P
     if shot is None:
         return parse(paint.COMMAND, Paint, arguments, default=default)
     default = shot.applied(default)
+    if is_given(arguments, "--without-film"):
+        default = dataclasses.replace(default, film=FilmConfig())
     options = parse(paint.COMMAND, Paint, arguments, default=default)
     if options.style != default.style:
         return dataclasses.replace(options, picture=None)

@@ -201,9 +201,13 @@ def over_shot(given: PaintRun, shot: PaintRun) -> PaintRun:
         name: getattr(given, name)
         for name in changed_fields(given, PaintRun(sequence="", out=Path()))
     }
-    for name, other in (("style", "picture"), ("picture", "style")):
+    for name, other, none in (
+        ("style", "picture", None),
+        ("picture", "style", None),
+        ("without_film", "film", FilmConfig()),
+    ):
         if name in changes:
-            changes.setdefault(other, None)
+            changes.setdefault(other, none)
     return dataclasses.replace(shot, **changes)
 
 

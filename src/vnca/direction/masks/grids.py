@@ -205,11 +205,19 @@ def _require(inputs: Inputs, paths: Paths, name: str) -> None:
     lacking = [path for path in paths.values() if not _has(path, name)]
     if lacking and inputs.missing == "stop":
         raise GridError(
-            f"{lacking[0]}: no grid {name!r}, or one without values; name a mask with `masks`, or "
-            "choose `missing` zero or hold"
+            f"{lacking[0]}: no grid {name!r}{_among(lacking[0])}, or one without values; name a "
+            "mask with `masks`, or choose `missing` zero or hold"
         )
     if lacking and len(lacking) == len(paths):
         raise GridError(f"{lacking[0]}: no grid {name!r} with values, in this or any other frame")
+
+
+def _among(path: Path) -> str:
+    """What a file has instead."""
+    if path.suffix.lower() != _VDB:
+        return ""
+    with open_vdb(path) as file:
+        return f" among {file.listed()}"
 
 
 def _has(path: Path, name: str) -> bool:
