@@ -137,7 +137,7 @@ class Direction:
         Raises:
             VncaError: If a file cannot be read, or frames lack a grid.
         """
-        for value in {*self.parts()}:
+        for value in dict.fromkeys(self.parts()):
             look = getattr(value, "require", None)
             if look is not None:
                 look(inputs)

@@ -1,8 +1,10 @@
 """What goes along with the smoke: its age, and what it was given when it appeared."""
 
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -47,52 +49,53 @@ class Carried:
         return found[:, 0], is_known & near
 
 
+class Carriage(Value):
+    """A value that smoke takes along."""
+
+    grows: ClassVar[float]
+    """What a frame adds to it."""
+
+    @abstractmethod
+    def born(self, moment: Moment, places: AnyArray) -> Answer:
+        """What smoke has that appears at places of a frame."""
+
+    def at(self, moment: Moment, places: AnyArray) -> Answer:
+        """See `Value.at`."""
+        born = self.born(moment, places)
+        if moment.carried is None:
+            return born
+        found, is_known = moment.carried.at(repr(self), places)
+        return np.where(is_known, found, np.float32(born))
+
+
 @dataclass(frozen=True)
-class Advected(Value):
-    """What a value was where and when the smoke appeared, moving with it since."""
+class Advected(Carriage):
+    """What a value was where and when the smoke appeared."""
 
     of: Value
-
-    def at(self, moment: Moment, places: AnyArray) -> Answer:
-        """See `Value.at`."""
-        return _asked(self, moment, places)
+    grows: ClassVar[float] = 0.0
 
     def born(self, moment: Moment, places: AnyArray) -> Answer:
-        """Of smoke that appears."""
+        """See `Carriage.born`."""
         return self.of.at(moment, places)
-
-    years = 0.0
-    """What a frame adds to it."""
 
 
 @dataclass(frozen=True)
-class Age(Value):
+class Age(Carriage):
     """For how many frames smoke has been there."""
 
-    def at(self, moment: Moment, places: AnyArray) -> Answer:
-        """See `Value.at`."""
-        return _asked(self, moment, places)
+    grows: ClassVar[float] = 1.0
 
     def born(self, moment: Moment, places: AnyArray) -> Answer:
-        """Of smoke that appears."""
+        """See `Carriage.born`."""
         return 0.0
-
-    years = 1.0
-    """What a frame adds to it."""
-
-
-def _asked(value: Advected | Age, moment: Moment, places: AnyArray) -> Answer:
-    born = value.born(moment, places)
-    if moment.carried is None:
-        return born
-    found, is_known = moment.carried.at(repr(value), places)
-    return np.where(is_known, found, np.float32(born))
 
 
 def carry(before: Carried | None, values: Iterable[Value], moment: Moment) -> Carried | None:
     """What is carried by the smoke of a frame, from the frame before; None of nothing.
 
-    Each cell looks back along the velocity, in two steps; what it finds no smoke at has appeared.
+    Each cell looks back along the velocity of this frame, in two steps; where it finds no smoke, it
+    has appeared.
 
     Args:
         before: What the frame before left; None for the first.
@@ -101,7 +104,7 @@ def carry(before: Carried | None, values: Iterable[Value], moment: Moment) -> Ca
 
     Reference: Stam 1999, section 3.2 (tracing back).
     """
-    wanted = [value for value in values if isinstance(value, (Advected, Age))]
+    wanted = [value for value in values if isinstance(value, Carriage)]
     if not wanted:
         return None
     smoke = moment.is_smoke
@@ -115,7 +118,7 @@ def carry(before: Carried | None, values: Iterable[Value], moment: Moment) -> Ca
             carried[repr(value)] = born.copy()
             continue
         found, is_known = before.at(repr(value), origin)
-        carried[repr(value)] = np.where(is_known, found + np.float32(value.years), born)
+        carried[repr(value)] = np.where(is_known, found + np.float32(value.grows), born)
     return Carried(cells, carried)
 
 
