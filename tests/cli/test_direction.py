@@ -54,9 +54,11 @@ def test_a_shot_is_painted_and_the_command_line_wins(
     other = vnca("paint", shot, "--strength", "1:0", "3:1", "-f", "1-3", "-o", tmp_path / "b")
     assert other.code == 0, other.err
     asked = json.loads((tmp_path / "b" / "paint.json").read_text())
-    assert asked["direction"]["strength"] == "1:0 3:1"
-    assert asked["direction"]["masks"] == ["low=height:1..0"]
+    assert asked["strength"] == "1:0 3:1"
+    assert asked["masks"] == ["low=height:1..0"]
     assert len(list((tmp_path / "b" / "painted").glob("*.vdb"))) == 3
+    fewer = vnca("paint", shot, "--resume", "--strength", "0.5")
+    assert "since --strength is another than when it was begun" in fewer.complaint
     styled = vnca("paint", shot, "--style", "embers", "-o", tmp_path / "c")
     assert styled.code == 0, styled.err
 

@@ -305,6 +305,7 @@ def _asked(options: PaintRun) -> dict[str, Any]:
     """What has to be the same to go on, as JSON values."""
     asked = {k: v for k, v in recorded(options).items() if k not in (*_ANY_TIME, "film")}
     path = options.picture and str(options.picture.absolute())
+    asked |= asked.pop("direction")  # one by one, to be named if one is another
     asked |= {"picture": path, "vnca": vnca.__version__}
     if not options.is_trained:
         # A file of a user may have been changed.
