@@ -14,7 +14,7 @@ from vnca.io import write_smoke
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
 
 MODEL = Path(__file__).parents[1] / "data" / "painting" / "rule.safetensors"
-QUICK = {"backend": "numpy", "warmup": 3, "steps_per_frame": 2}
+QUICK = {"warmup": 3, "steps_per_frame": 2}
 Grids = Mapping[str, AnyArray]
 """What a painted file holds, by the name of the grid, where the density is active."""
 
