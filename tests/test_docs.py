@@ -14,6 +14,7 @@ from vnca.cli import COMMANDS, main
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+EXAMPLES = ROOT / "examples"
 SMOKE = ROOT / "tests" / "data" / "plume_sphere_0030.vdb"
 MODEL = ROOT / "tests" / "data" / "painting" / "rule.safetensors"
 
@@ -69,6 +70,7 @@ def test_a_command_of_the_documentation_is_understood(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text('base = "draft"\n')  # a preset that a page tells to make
+    shutil.copy(EXAMPLES / "shot.toml", tmp_path)
     try:
         code = main(words)
     except Read:

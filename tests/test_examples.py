@@ -1,10 +1,13 @@
 """The examples run, each as its first lines say."""
 
 import importlib.util
+import shutil
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+import vnca
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -16,6 +19,16 @@ def example(name: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def test_a_shot(tmp_path: Path) -> None:
+    """At a size that takes a moment."""
+    shutil.copy(EXAMPLES / "shot.toml", tmp_path)
+    assert len([*vnca.simulate("plume", out=tmp_path / "smoke", resolution=16, frames=4)]) == 4
+    files = vnca.paint(
+        tmp_path / "shot.toml", frames="2-4", refine=1, without_film=True, device="cpu"
+    )
+    assert [file.parent for file in files] == 3 * [tmp_path / "painted_shot" / "painted"]
 
 
 # They train networks at their real size, if for an iteration only.

@@ -13,6 +13,7 @@ RANKS = {
     "engine": 1, "simulation": 1,
     "rule": 2,
     "io": 3, "rendering": 3, "features": 3,
+    "direction": 3.5,
     "losses": 4, "painting": 4,
     "meshes": 5,
     "training": 6,
@@ -22,7 +23,7 @@ RANKS = {
     "comparison": 9,
     "cli": 10, "__main__": 11,
 }  # fmt: skip
-WITHOUT_TORCH = {"core", "rule", "io", "simulation", "painting"}
+WITHOUT_TORCH = {"core", "rule", "io", "simulation", "direction", "painting"}
 BACKENDS_WITH_TORCH = (
     "tensors.py",
     "reference/",

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from vnca.core.errors import Cancelled, VncaError
     from vnca.core.lattice import Lattice
     from vnca.core.volume import Volume
+    from vnca.direction import Direction
+    from vnca.direction.shot import Shot
     from vnca.features import load_network
     from vnca.io import SmokeFormat, read_smoke, smoke_box, write_painted, write_smoke
     from vnca.io.film import FilmWriter
@@ -71,6 +73,8 @@ _HOMES = {
     "Box": "core",
     "Conditioning": "rule.conditioning",
     "register_conditioning": "rule.conditioning",
+    "Direction": "direction",
+    "Shot": "direction.shot",
     "FilmWriter": "io.film",
     "Lattice": "core.lattice",
     "Model": "rule.model",
@@ -109,6 +113,7 @@ __all__ = [
     "Box",
     "Cancelled",
     "Conditioning",
+    "Direction",
     "Evaluation",
     "FilmConfig",
     "FilmWriter",
@@ -122,6 +127,7 @@ __all__ = [
     "Rule",
     "RuleConfig",
     "Scales",
+    "Shot",
     "SmokeConfig",
     "SmokeFormat",
     "StylizeConfig",

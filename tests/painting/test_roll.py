@@ -21,6 +21,7 @@ from vnca.engine.automaton import Automaton, changing_rows, hash_cells
 from vnca.engine.domain import Domain
 from vnca.io.velocity import extrapolated
 from vnca.painting import Painting, Roll, StylizeConfig, stylize
+from vnca.painting import shown as shown_module
 from vnca.painting.frames import read_ahead
 from vnca.rule import Decoder, Rule, RuleConfig, Scales
 from vnca.rule.paint import SAMPLES, Between, colours, density_factors
@@ -161,7 +162,7 @@ def test_neighbours_are_forgotten_before_colour_is_continued(
         return extrapolated(*arguments)
 
     monkeypatch.setattr(Domain, "around_smoke", around)
-    monkeypatch.setattr(roll_module, "extrapolated", continued)
+    monkeypatch.setattr(shown_module, "extrapolated", continued)
     rolled([ball(0), ball(1)])
     assert not domains
 

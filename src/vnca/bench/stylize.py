@@ -164,7 +164,7 @@ def measure_stylizing(
         peaks = {key: peak_mb(work, "cpu") for key, work in works.items()}
     roll = rolls[backends[0]]
     cells = round(np.mean(_compute(roll, painted.volumes)))
-    frames, steps = len(painted.volumes), roll.steps_per_frame
+    frames, steps = len(painted.volumes), int(roll.steps_per_frame)
     rows = []
     for (name, files), taken in times.items():
         spread = Spread.of([seconds / frames for seconds in taken])

@@ -8,7 +8,7 @@ import vnca
 from vnca.cli.help import ASKED, JSON_PROGRESS
 from vnca.cli.options import command_at, spelled_out, usage
 from vnca.cli.terminal import as_options, end_line, event, json_events, terminable
-from vnca.core.errors import Terminated, VncaError
+from vnca.core.errors import Terminated, TextError, VncaError
 
 COMMANDS = {
     "paint": "paint a sequence in the style of a picture: train, stylize and film in one go",
@@ -73,6 +73,8 @@ def _call(arguments: Sequence[str]) -> int:
     try:
         with terminable():
             command_at(HOMES[name])(rest)
+    except TextError as error:
+        return _failed(str(error), error.pointer)
     except VncaError as error:
         return _failed(str(error))
     except ModuleNotFoundError as error:
@@ -92,10 +94,13 @@ def _call(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _failed(message: str) -> int:
+def _failed(message: str, shown: Sequence[str] = ()) -> int:
+    """Say what went wrong; and below it, on a terminal, the text in which it did."""
     end_line()
     # What a library says of a damaged file may have several lines.
     line = as_options(" ".join(message.split()))
     if not event("error", message=line, exit_code=2):
         print("vnca:", line, file=sys.stderr)
+        for each in shown:
+            print(f"  {each}", file=sys.stderr)
     return 2

@@ -33,8 +33,8 @@ _PEER = ("out", "frames", "features", "overwrite", *_SMOKE)
 _PEERS = ("iterations", "gamma", "enlarged", "whole-picture", "seed")
 COMMON: Mapping[str, tuple[str, ...]] = {
     "paint": (
-        *("out", "style", "preset", "training-frame", "frames", "refine", "strength", "seed"),
-        *(*_SMOKE, "device", "resume", "overwrite"),
+        *("out", "style", "preset", "frames", "refine", "strength", "masks"),
+        *("layers", "seed", *_SMOKE, "device", "resume", "overwrite"),
     ),
     "train": (
         *("out", "preset", "iterations", "view.size", "seed", "texture", "graft", *_SMOKE),
@@ -42,7 +42,7 @@ COMMON: Mapping[str, tuple[str, ...]] = {
     ),
     "stylize": (
         *("out", "frames", "refine", "preview", "strength", "density-strength", "gamma", "seed"),
-        *("device", "resume", "overwrite", "on-error", *_SMOKE),
+        *("masks", "layers", "device", "resume", "overwrite", "on-error", *_SMOKE),
     ),
     "evaluate": ("out", "frames", "refine", "style", "size", "device", "json"),
     "ablate": ("out", "preset", "seeds", "iterations", "json", "device", *_SMOKE),
@@ -73,7 +73,7 @@ COMMON: Mapping[str, tuple[str, ...]] = {
 }
 """The options that `--help` shows of a command, in its order; of others it shows all."""
 JSON_PROGRESS = "--json-progress"
-NAMES: dict[str, str] = dict.fromkeys(("config", "rule", "smoke", "grow", "film"), "")
+NAMES: dict[str, str] = dict.fromkeys(("config", "rule", "smoke", "grow", "film", "direction"), "")
 """What options of fields are called where it is not as the field; empty for a dataclass whose
 fields are options as if they were of the one around it."""
 SHOT_NAMES = {"fps": "film-fps", "step": "ray-step"}
@@ -271,6 +271,8 @@ def _form(hint: Any, separator: str) -> str:
         return _form(inside[0], separator)
     if origin is Literal:
         return "{" + ",".join(map(str, inside)) + "}" if len(inside) > 1 else str(inside[0])
+    if origin in (Union, UnionType) and {float, str} <= {*inside}:
+        return "VALUE"
     if origin in (Union, UnionType):
         return "|".join(_form(one, separator) for one in inside if one is not type(None))
     if origin is tuple and inside[-1] is not Ellipsis:

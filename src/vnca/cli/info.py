@@ -17,6 +17,7 @@ from vnca.core import FloatArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import FileFormatError, printable
 from vnca.core.files import existing_file, writable_file
+from vnca.direction.colour.palette import codes, main_colours
 from vnca.io.film import contact_sheet
 from vnca.io.picture import fit, write_image
 from vnca.io.vdb import GridHeader, open_vdb
@@ -97,6 +98,7 @@ def _model_facts(path: Path) -> dict[str, Any]:
         "rule": asdict(model.rule.config),
         "conditioning": list(map(listed_conditioning, model.rule.config.conditioning)),
         "scales": asdict(model.rule.scales),
+        "palette": _palette(model),
         "training": model.training,
     }
 
@@ -145,8 +147,16 @@ def describe_model(path: Path) -> list[str]:
         ),
         f"  scales      density {scales.density:.4g}, velocity {scales.velocity:.4g} cells/frame, "
         f"gamma {scales.gamma:.4g} per cell",
+        f"  palette     {' '.join(_palette(model)) or 'not known'}",
         *(f"  {name:11} {json.dumps(value)}" for name, value in model.training.items()),
     ]
+
+
+def _palette(model: Model) -> list[str]:
+    """The main colours of a model's picture, in the order in which `recolour` numbers them."""
+    if model.style is None:
+        return []
+    return codes(main_colours(srgb_to_linear(model.style / np.float32(255))))
 
 
 def _described_input(name: str) -> str:
@@ -220,7 +230,7 @@ def run_styles(arguments: Sequence[str]) -> None:
         print_json({name: model.training for name, model in named.items()})
     else:
         for name, model in named.items():
-            print(f"{name:16}{model.training.get('title', '')}")
+            print(f"{name:16}{model.training.get('title', ''):48}{' '.join(_palette(model))}")
     if options.sheet is not None:
         pairs = [(_linear(named[name].style), _painted(name)) for name in named]
         rows = [pairs[start : start + COLUMNS] for start in range(0, len(pairs), COLUMNS)]

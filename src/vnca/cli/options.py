@@ -105,9 +105,20 @@ _OPTION_INDENT = 6
 
 
 def spelled_out(arguments: Sequence[str]) -> list[str]:
-    """Arguments with `--out` for `-o`, and so on."""
-    words = [word.partition("=") for word in arguments]
-    return [SHORT.get(name, name) + joint + value for name, joint, value in words]
+    """Arguments with `--out` for `-o`, and so on, and keys of one value as one."""
+    words: list[str] = []
+    for argument in arguments:
+        name, joint, value = argument.partition("=")
+        word = SHORT.get(name, name) + joint + value
+        if len(words) > 1 and _KEY.match(word) and _BEFORE_KEY.match(words[-1]):
+            words[-1] += f" {word}"
+        else:
+            words.append(word)
+    return words
+
+
+_KEY = re.compile(r"-?\d+(\.\d+)?:[^:\\/]")
+_BEFORE_KEY = re.compile(r"(linear|smooth|hold)$|((linear|smooth|hold) )?-?\d+(\.\d+)?:[^:\\/]")
 
 
 def chosen(arguments: Sequence[str], option: str, default: str) -> str:

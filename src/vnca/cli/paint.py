@@ -8,11 +8,15 @@ from typing import Annotated, Any
 
 import tyro
 
-from vnca.cli.options import parse
+from vnca.cli.options import is_given, parse
 from vnca.cli.terminal import Terminal, finishing
+from vnca.direction import Direction
+from vnca.direction.shot import SUFFIX as SHOT
+from vnca.direction.shot import Shot
 from vnca.io import SmokeFormat
 from vnca.painting import StylizeConfig
 from vnca.recipe import paint, painting, recorded_smoke, rendering
+from vnca.recipe.film import FilmConfig
 from vnca.rule.model import Model
 
 
@@ -20,7 +24,8 @@ from vnca.rule.model import Model
 class Paint(paint.PaintRun):
     """Paint a smoke sequence in the style of a picture: train, stylize and film in one go.
 
-    What more there is to set, `vnca train`, `vnca stylize` and `vnca render` take one by one.
+    Or as a file has it: vnca paint shot.toml. `vnca train`, `vnca stylize` and `vnca render` take
+    more options one by one.
     """
 
     sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SMOKE")]
@@ -35,19 +40,46 @@ class Paint(paint.PaintRun):
     """How the rule is trained: draft, standard, paper, or a TOML file."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
+    direction: Direction = field(default_factory=Direction)
+    """What is asked of the painting."""
 
 
 def run(arguments: Sequence[str]) -> None:
     """Read the options and do the whole job; SIGTERM ends it once a piece of it is finished."""
-    options = parse(paint.COMMAND, Paint, arguments)
+    shot = None
+    if arguments and Path(arguments[0]).suffix == SHOT:
+        shot, arguments = Shot.load(arguments[0]), arguments[1:]
+    options = _asked(shot, arguments, SmokeFormat())
     smoke = paint.recorded_format(options)
     if smoke != options.smoke:
-        missing: Any = tyro.MISSING
-        defaults = dataclasses.replace(options, sequence=missing, out=missing, smoke=smoke)
-        options = parse(paint.COMMAND, Paint, arguments, default=defaults)
+        options = _asked(shot, arguments, smoke)
+    options.require_one_style()
     with finishing() as stop_if_asked:
         for _ in paint.run(options, Terminal(stop_if_asked)):
             pass
+
+
+def _asked(shot: Shot | None, arguments: Sequence[str], smoke: SmokeFormat) -> Paint:
+    """The options of a shot, if there is one, in the place of which stand those of the line.
+
+    Args:
+        shot: The shot.
+        arguments: The others.
+        smoke: How smoke is read unless something else is asked.
+    """
+    missing: Any = tyro.MISSING
+    default = Paint(sequence=missing, out=missing, smoke=smoke)
+    if shot is None:
+        return parse(paint.COMMAND, Paint, arguments, default=default)
+    default = shot.applied(default)
+    if is_given(arguments, "--without-film"):
+        default = dataclasses.replace(default, film=FilmConfig())
+    options = parse(paint.COMMAND, Paint, arguments, default=default)
+    if options.style != default.style:
+        return dataclasses.replace(options, picture=None)
+    if options.picture != default.picture:
+        return dataclasses.replace(options, style=None)
+    return options
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,6 +6,7 @@ from a file: they can neither add lines nor write to the terminal what it would 
 """
 
 _LONGEST = 2000
+_LONGEST_SHOWN = 72
 
 
 def printable(text: str) -> str:
@@ -39,6 +40,27 @@ class SequenceError(VncaError):
 
 class OptionError(VncaError):
     """An option or argument has a value that cannot work."""
+
+
+class TextError(OptionError):
+    """Text that stands for a value cannot be read as one; knows where it cannot.
+
+    Attributes:
+        text: The text.
+        at: Number of the character, from 0, at which it is no longer one.
+    """
+
+    def __init__(self, message: str, text: str, at: int) -> None:
+        super().__init__(message)
+        self.text, self.at = text, at
+
+    @property
+    def pointer(self) -> list[str]:
+        """The text, and a line with a caret under the character."""
+        # Each character as one, or the caret would point beside it.
+        shown = "".join(c if c.isprintable() else " " for c in self.text)
+        start = max(0, self.at - _LONGEST_SHOWN // 2)
+        return [shown[start : start + _LONGEST_SHOWN], " " * (self.at - start) + "^"]
 
 
 class ShapeError(VncaError):

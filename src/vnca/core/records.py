@@ -38,7 +38,7 @@ def with_values(default: T, given: Mapping[str, Any], outer: str = "") -> T:
     """A dataclass with some of its fields replaced, each by a value of the type of the field.
 
     A field that is a dataclass itself takes an instance, or a mapping of its own fields. Whole
-    numbers are taken for numbers, lists for tuples.
+    numbers are taken for numbers, lists for tuples, and a mapping for texts NAME=VALUE.
 
     Args:
         default: An instance.
@@ -107,6 +107,8 @@ def _fitted(hint: Any, value: Any) -> Any:
     if origin is Literal:
         fits = any(type(value) is type(one) and value == one for one in inside)
     elif origin is tuple:
+        if isinstance(value, Mapping) and inside == (str, Ellipsis):
+            value = [f"{name}={each}" for name, each in value.items()]
         fits = isinstance(value, (list, tuple))
         if fits:
             is_any_length = inside[-1] is Ellipsis

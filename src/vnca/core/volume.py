@@ -1,7 +1,7 @@
 """One frame of smoke, whatever file it came from."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -172,6 +172,17 @@ class Volume:
         matrix = self.index_to_world.copy()
         matrix[:3, 3] += matrix[:3, :3] @ self.origin
         return matrix
+
+    def within(self, box: Box) -> "Volume":
+        """The same smoke over another box, which holds its own."""
+        density, velocity = self.density_field, self.velocity_field
+        return Volume.of_fields(
+            replace(density, box=box),
+            None if velocity is None else replace(velocity, box=box),
+            self.index_to_world,
+            self.frame,
+            {name: replace(held, box=box) for name, held in self.named_fields.items()},
+        )
 
     def refined(self, factor: int) -> "Volume":
         """The same smoke in the same place, on a grid `factor` times as fine along each axis.

@@ -39,6 +39,8 @@ from vnca.io.vdb_smoke import read_density
 from vnca.io.velocity import extrapolated
 
 COLOUR_GRIDS = ("Cd",)
+EMISSION = "emission"
+"""Name of the grid of light that smoke gives of itself."""
 # Metadata of a density that hold for a colour on its cells as well. All others may tell of its
 # name, its type, its values or its history.
 _SHARED_METADATA = ("class", "is_local_space")
@@ -58,9 +60,10 @@ def write_painted(
     lattice: Lattice | None = None,
     colour_grids: Sequence[str] = COLOUR_GRIDS,
     refine: int = 1,
-    beyond: int = 0,
     provenance: Provenance | None = None,
     file: VdbFile | None = None,
+    emission: Field | None = None,
+    beyond: int = 0,
 ) -> None:
     """Write a frame of a sequence with new density and colour as a VDB file.
 
@@ -83,9 +86,11 @@ def write_painted(
             unless given.
         colour_grids: Names of the colour grids, several to have the colour several times.
         refine: How many times as fine as the source's the painted cells are along each axis.
-        beyond: How many of the painted cells around those of the source there may be smoke.
         provenance: What the file's metadata is to tell of the painting.
         file: The source itself, if it is a VDB file and open already.
+        emission: Light that the smoke gives, of the same cells as the colour, for a grid of its
+            own.
+        beyond: How many of the painted cells around those of the source there may be smoke.
 
     Raises:
         OptionError: If a colour grid is named like the density, or two are named alike.
@@ -99,7 +104,8 @@ def write_painted(
         raise ShapeError(
             f"painted density {density.shape} and colour {colour.shape} do not fit {box}"
         )
-    names = [format.density_grid, *colour_grids]
+    lit = [] if emission is None else [EMISSION]
+    names = [format.density_grid, *colour_grids, *lit]
     if len(set(names)) < len(names):
         raise OptionError(f"colour_grids: expected names of their own, got {', '.join(names)}")
     _require_vdb(path)
@@ -107,13 +113,16 @@ def write_painted(
         density = Field.from_dense(density, box.lower)
     if not isinstance(colour, Field):
         colour = Field.from_dense(colour, box.lower)
-    frame = _Painting(density, colour, lattice, up_axis_of(source, format), refine, beyond)
+    colours: dict[str, Field] = dict.fromkeys(colour_grids, colour)
+    if emission is not None:
+        colours[EMISSION] = emission
+    frame = _Painting(density, colours, lattice, up_axis_of(source, format), refine, beyond)
     told = provenance.metadata if provenance else {}
     if source.suffix.lower() != ".vdb":
-        _paint_other(path, source, format, frame, colour_grids, told)
+        _paint_other(path, source, format, frame, told)
         return
     with open_vdb(source) if file is None else nullcontext(file) as opened:
-        _paint_vdb(path, opened, format, frame, colour_grids, told)
+        _paint_vdb(path, opened, format, frame, told)
 
 
 def write_smoke(path: str | Path, volume: Volume) -> None:
@@ -187,7 +196,7 @@ class _Painting:
 
     Attributes:
         density: Of cells `refine` times as fine as those of the lattice.
-        colour: Of the same cells.
+        colours: Of the same cells, each under the name that it gets.
         lattice: None for those of the source, along our axes.
         up: Which axis of the source's world points up.
         refine: How fine they are.
@@ -195,14 +204,16 @@ class _Painting:
     """
 
     density: Field
-    colour: Field
+    colours: Mapping[str, Field]
     lattice: Lattice | None
     up: UpAxis
     refine: int
     beyond: int
 
-    def in_file(self, transform: Transform, density: Field, what: str) -> tuple[Field, Field]:
-        """Density and colour of the file's cells, or as fine ones.
+    def in_file(
+        self, transform: Transform, density: Field, what: str
+    ) -> tuple[Field, dict[str, Field]]:
+        """Density and colours of the file's cells, or as fine ones.
 
         Args:
             transform: Of the file's cells.
@@ -221,27 +232,32 @@ class _Painting:
         if painted.union(needed) != painted:
             raise ShapeError(f"{what}: smoke in {needed}, but only {painted} was painted")
         over = cells.refined(self.refine)
+        if not over.is_empty:
+            over = over.grown(self.beyond)
         source, target = (refined_transform(matrix, self.refine) for matrix in (world, ours))
         back = Placement.between(source, target, over, what).inverse
-        colour = back.field(self.colour, over, "nearest")
-        if back.is_whole:
-            return back.field(self.density, over), colour
+        # Of a colour that has several names there is one field.
+        named = {id(colour): colour for colour in self.colours.values()}
+        moved = {key: back.field(colour, over, "nearest") for key, colour in named.items()}
+        colours = {name: moved[id(colour)] for name, colour in self.colours.items()}
+        if back.is_whole or self.beyond:
+            return back.field(self.density, over), colours
         positive = np.maximum(density.values.astype(np.float32), 0)
         plain = Volume.of_fields(replace(density, values=positive), None, world, 0)
-        factor = self._factor(on_lattice(plain, Lattice(ours), what).refined(self.refine))
-        factor = back.field(factor, over, "nearest")
+        change = self._change(on_lattice(plain, Lattice(ours), what).refined(self.refine))
+        # Of what is nothing everywhere, nothing comes of interpolation.
+        change = back.field(change, over, "nearest")
         finer = plain.refined(self.refine).density_field
-        return replace(finer, values=finer.values * factor.blocks(finer.bricks)), colour
+        return replace(finer, values=finer.values * (1 + change.blocks(finer.bricks))), colours
 
     def active(self, density: Field, of_file: Field, background: AnyArray | float = 0) -> Field:
         """Which cells to store; `of_file` are active in the file."""
         if self.refine == 1 and not self.beyond:
             return of_file
         dense = replace(density, values=density.values != 0, outside=False).trimmed()
-        if self.refine == 1:
-            return of_file.union(dense)
         # A cell that is not stored would not be empty.
-        return dense.union(divided(of_file, self.refine)) if background else dense
+        keeps = background or self.refine == 1
+        return dense.union(divided(of_file, self.refine)) if keeps else dense
 
     def transform(self, of_file: Transform) -> Transform:
         """That of the painted cells; `of_file` is that of the file's."""
@@ -249,24 +265,25 @@ class _Painting:
             return of_file
         return Transform.from_matrix(refined_transform(of_file.index_to_world, self.refine))
 
-    def _factor(self, plain: Volume) -> Field:
-        """What the painting multiplied the density by; 1 where there was none."""
+    def _change(self, plain: Volume) -> Field:
+        """What the painting multiplied the density by, less 1; 0 where there was none."""
         before = plain.density_field
         factor, painted = np.ones_like(before.values), self.density.blocks(before.bricks)
         np.divide(painted, before.values, out=factor, where=before.values > 0)
-        return Field(before.bricks, factor, self.density.box, outside=1.0)
+        return Field(before.bricks, factor - 1, self.density.box)
 
 
-def _with_rim(colour: Field, active: Field) -> tuple[Field, Field]:
+def _with_rim(colours: Mapping[str, Field], active: Field) -> tuple[dict[str, Field], Field]:
     """Colours that go on for a cell around the smoke, and the cells that have one.
 
     Renderers interpolate density and colour one by one: beside black, the border of opaque smoke
     would be dark.
     """
     box = active.box.grown(1)
-    coloured = dilated(replace(active, box=box), 1)
+    active = replace(active, box=box)
     # A cell at a corner is three steps away.
-    return extrapolated(replace(colour, box=box), replace(active, box=box), 3)[0], coloured
+    wide = {n: extrapolated(replace(c, box=box), active, 3)[0] for n, c in colours.items()}
+    return wide, dilated(active, 1)
 
 
 def _paint_vdb(
@@ -274,7 +291,6 @@ def _paint_vdb(
     file: VdbFile,
     format: SmokeFormat,
     frame: _Painting,
-    colour_grids: Sequence[str],
     told: Mapping[str, Entry],
 ) -> None:
     about = {**without_provenance(file.metadata), **told}
@@ -283,20 +299,18 @@ def _paint_vdb(
         return
     header, old, cells = read_density(file, format)
     what = f"{file.path}: grid {header.name!r}"
-    before, active = old.fields(cells.grown(frame.beyond))
-    density, colour = frame.in_file(old.transform, before, what)
+    before, active = old.fields(cells)
+    density, colours = frame.in_file(old.transform, before, what)
     background = old.tree.background
     active = frame.active(density, active, background)
-    colour, coloured = _with_rim(colour, active)
+    colours, coloured = _with_rim(colours, active)
     transform = frame.transform(old.transform)
     dtype = VALUE_TYPES[old.value_type].dtype
     if dtype.kind != "f":
         dtype = np.dtype(np.float32)
     if old.is_half or dtype.itemsize == 2:
-        density, colour = (
-            replace(field, values=np.clip(field.values, -_HALF_MOST, _HALF_MOST))
-            for field in (density, colour)
-        )
+        density = _as_half(density)
+        colours = {name: _as_half(colour) for name, colour in colours.items()}
     density = replace(density, values=density.values.astype(dtype))
     new = Grid.from_fields(
         old.name, density, active, like=old, transform=transform, background=background
@@ -306,16 +320,21 @@ def _paint_vdb(
     grids: list[Grid | GridHeader] = [
         new if name == header.name else other
         for name, other in file.grids.items()
-        if name == header.name or decoded(other.grid_name) not in colour_grids
+        if name == header.name or decoded(other.grid_name) not in colours
     ]
     shared = {name: old.metadata[name] for name in _SHARED_METADATA if name in old.metadata}
     grids += [
         Grid.from_fields(
             name, colour, coloured, transform=transform, metadata=shared, half=old.is_half
         )
-        for name in colour_grids
+        for name, colour in colours.items()
     ]
     write_vdb(path, grids, metadata=about)
+
+
+def _as_half(field: Field) -> Field:
+    """Values that a half float can hold."""
+    return replace(field, values=np.clip(field.values, -_HALF_MOST, _HALF_MOST))
 
 
 def _paint_other(
@@ -323,15 +342,14 @@ def _paint_other(
     source: str | Path,
     format: SmokeFormat,
     frame: _Painting,
-    colour_grids: Sequence[str],
     told: Mapping[str, Entry],
 ) -> None:
     stored = reader_of(Path(source)).read(Path(source), format)
     transform = Transform.from_matrix(stored.index_to_world)
-    before = stored.density.within(stored.density.box.grown(frame.beyond))
-    density, colour = frame.in_file(transform, before, str(source))
+    before = stored.density
+    density, colours = frame.in_file(transform, before, str(source))
     active = frame.active(density, replace(before, values=before.values != 0, outside=False))
-    colour, coloured = _with_rim(colour, active)
+    colours, coloured = _with_rim(colours, active)
     grids = [
         Grid.from_fields(
             name,
@@ -342,7 +360,7 @@ def _paint_other(
         )
         for name, values, stored in [
             (format.density_grid, density, active),
-            *((name, colour, coloured) for name in colour_grids),
+            *((name, colour, coloured) for name, colour in colours.items()),
         ]
     ]
     if (velocity := stored.velocity) is not None:

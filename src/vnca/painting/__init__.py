@@ -14,14 +14,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vnca.core import Box, FloatArray, IntArray
+from vnca.core import AnyArray, Box, FloatArray, IntArray
 from vnca.core.errors import OptionError
-from vnca.core.field import Field
-from vnca.core.volume import Volume, dense, field_of
+from vnca.core.volume import Volume
+from vnca.direction import Carried, Direction, Inputs, Moment
+from vnca.direction.carried import carry
+from vnca.direction.colour import Editing
+from vnca.direction.mixing import Answer, Parts, layered
+from vnca.direction.values import Constant
 from vnca.engine import Compute, Session, open_session
 from vnca.engine.domain import Domain, DomainKind
 from vnca.io.smoke_format import on_one_lattice
-from vnca.io.velocity import extrapolated
+from vnca.painting.shown import COLOUR_DILATION, Painting, composed
 from vnca.painting.transport import transported
 from vnca.rule import SMOKE_THRESHOLD, Rule
 from vnca.rule.conditioning import priors
@@ -36,47 +40,21 @@ from vnca.rule.paint import (
 
 
 @dataclass(frozen=True)
-class StylizeConfig:
-    """How a rule is rolled over a sequence, and how strongly it shows."""
+class StylizeConfig(Direction):
+    """How a rule is rolled over a sequence, and how it shows."""
 
-    steps_per_frame: int | None = None
-    """Steps of the automaton between two frames; as many as in training unless given. On a grid K
-    times as fine they are K times as many, given or not."""
     warmup: int = 64
     """Steps on the first frame before it is painted."""
-    pattern_speed: float | None = None
-    """How fast the velocity carries the pattern: 0 not at all, 1 along with the smoke, 2 ahead of
-    it; 1 unless given, but 0 for a rule that was taught to move its pattern by itself."""
     domain: DomainKind | None = None
     """Which cells are active: those near the smoke (active) or all of its box; as in training
     unless given."""
-    strength: float = 1.0
-    """Colour of the painting, from 0 (white smoke) to 1."""
-    density_strength: float = 1.0
-    """How much the painting changes the density, from 0 (not at all) to 1."""
     seed: int = 0
     """Same seed, same machine, same painting."""
 
     def __post_init__(self) -> None:
-        if self.warmup < 0 or (self.steps_per_frame is not None and self.steps_per_frame < 0):
-            raise OptionError("`steps_per_frame` and `warmup` must not be negative")
-        if self.pattern_speed is not None and not abs(self.pattern_speed) <= FASTEST_PATTERN:
-            raise OptionError(
-                f"`pattern_speed` {self.pattern_speed:g}: must be from {-FASTEST_PATTERN} to "
-                f"{FASTEST_PATTERN}"
-            )
-        for name in ("strength", "density_strength"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise OptionError(f"`{name}` {getattr(self, name)}: must be from 0 to 1")
-
-
-FASTEST_PATTERN = 8
-"""Times as fast as the smoke, at most, may a pattern be."""
-UNPAINTED = 1.0
-"""Linear colour of smoke far from all that the rule paints: white."""
-COLOUR_DILATION = 3
-"""How many cells beyond the active ones their colour goes on, so that faint smoke is no pale seam
-where a renderer interpolates it."""
+        super().__post_init__()
+        if self.warmup < 0:
+            raise OptionError("`warmup` must not be negative")
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,67 +67,22 @@ class RollState:
         values: `[n + 1, C]`, their state and a last row of zeros.
         steps_done: Steps since the sequence began, by which the next ones are numbered.
         frame: Number of that frame, if there was one.
+        carried: What goes along with the smoke beside it, where anything does.
+        layers: What the rules of further layers left, of each its own.
     """
 
     cells: IntArray
     values: FloatArray
     steps_done: int = 0
     frame: int | None = None
+    carried: Carried | None = None
+    layers: tuple["RollState", ...] = ()
 
     @classmethod
     def empty(cls, channels: int, steps_done: int = 0) -> "RollState":
         """That of nothing painted yet."""
         cells = np.zeros((0, 3), dtype=np.int32)
         return cls(cells, np.zeros((1, channels), dtype=np.float32), steps_done)
-
-
-@dense("density", "colour", what=lambda painting: f"frame {painting.smoke.frame}")
-@dataclass(frozen=True, eq=False)
-class Painting:
-    """One painted frame, on the same cells as its smoke.
-
-    Attributes:
-        smoke: The frame as it was read, on the grid of the painting.
-        density: `[x, y, z]`, painted, in the units of the file; the array is made when it is asked
-            for, as the smoke's is.
-        colour: Likewise, linear RGB `[x, y, z, 3]`; beside the active cells continued from them,
-            white farther away.
-        state: What it leaves to the next frame.
-        coarse: The frame on the grid of the automaton; None where that is not known.
-    """
-
-    smoke: Volume
-    density: FloatArray
-    colour: FloatArray
-    state: RollState
-    coarse: Volume | None = None
-
-    @classmethod
-    def of_fields(
-        cls, smoke: Volume, density: Field, colour: Field, state: RollState, coarse: Volume
-    ) -> "Painting":
-        """A painting given by where there is smoke and colour."""
-        painted: Any = density
-        coloured: Any = colour
-        return cls(smoke, painted, coloured, state, coarse)
-
-    @cached_property
-    def density_field(self) -> Field:
-        """The density where there is any."""
-        return field_of(self, "density", self.smoke.origin)
-
-    @cached_property
-    def colour_field(self) -> Field:
-        """The colour where it is not white."""
-        return field_of(self, "colour", self.smoke.origin, outside=UNPAINTED)
-
-
-class _Parts(NamedTuple):
-    """What is painted: cells `[m, 3]`, their linear RGB `[m, 3]`, factors `[m]` of density."""
-
-    at: IntArray
-    colour: FloatArray
-    factors: FloatArray
 
 
 class Ready(NamedTuple):
@@ -159,11 +92,13 @@ class Ready(NamedTuple):
         smoke: On a grid as fine as the automaton's.
         domain: Its active cells.
         session: The automaton on them; None if there are none.
+        layers: What further layers take, of each its own.
     """
 
     smoke: Volume
     domain: Domain
     session: Session | None
+    layers: tuple["Ready", ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +115,9 @@ class Roll:
         grid: How many times as fine as the grid of the smoke the automaton's is.
         finer: How many times as fine as the automaton's the grid of the painting is; what is there
             between the cells, the decoder says.
+        layers: The rules of further layers, in the order of `config.layers`.
+        inputs: What the direction of `config` takes beside the smoke.
+        editing: What it does with colours as a whole.
     """
 
     rule: Rule
@@ -189,18 +127,23 @@ class Roll:
     colour_dilation: int = COLOUR_DILATION
     grid: int = 1
     finer: int = 1
+    layers: tuple["Roll", ...] = ()
+    inputs: Inputs = field(default_factory=Inputs)
+    editing: Editing = field(default_factory=Editing)
 
     @property
-    def steps_per_frame(self) -> int:
-        """Those asked for, or else those of training."""
-        asked = self.config.steps_per_frame
-        return self.rule.config.steps_per_frame if asked is None else asked
+    def steps_per_frame(self) -> int | str:
+        """Those asked for, or else those of training; as text where they are no number."""
+        asked = self.config.values["steps_per_frame"]
+        if asked is None:
+            return self.rule.config.steps_per_frame
+        constant = isinstance(asked, Constant)
+        return round(asked.number) * self.grid if constant else str(self.config.steps_per_frame)
 
     @property
-    def pattern_speed(self) -> float:
-        """That asked for, or else that of training."""
-        asked = self.config.pattern_speed
-        return float(self.rule.config.transport) if asked is None else asked
+    def beyond(self) -> int:
+        """How many cells of the painting beyond the smoke's box there may be smoke."""
+        return self.config.fluff * self.grid * self.finer
 
     @property
     def domain_kind(self) -> DomainKind:
@@ -213,22 +156,22 @@ class Roll:
         A decoder is asked at so many more points; without one, the automaton runs on a grid as
         fine.
         """
+        layers = tuple(layer.refined(factor) for layer in self.layers)
         if self.rule.decoder is not None:
-            return replace(self, finer=factor * self.finer)
-        asked = self.config.steps_per_frame
-        steps = None if asked is None else factor * asked
+            return replace(self, finer=factor * self.finer, layers=layers)
         return replace(
             self,
             rule=self.rule.refined(factor),
-            config=replace(self.config, steps_per_frame=steps),
             box=self.box.refined(factor),
             colour_dilation=self.colour_dilation * factor,
             grid=self.grid * factor,
+            layers=layers,
         )
 
     def start(self) -> RollState:
         """The state before the first frame."""
-        return RollState.empty(self.rule.config.channels)
+        layers = tuple(layer.start() for layer in self.layers)
+        return replace(RollState.empty(self.rule.config.channels), layers=layers)
 
     def ready(self, smoke: Volume) -> Ready:
         """What painting a frame takes that does not wait for the frame before it.
@@ -240,11 +183,13 @@ class Roll:
             GridError: If the smoke lacks what the rule is conditioned on.
         """
         domain = self._domain(smoke)
+        layers = tuple(layer.ready(smoke) for layer in self.layers)
         if len(domain) == 0:
-            return Ready(smoke, domain, None)
+            return Ready(smoke, domain, None, layers)
         conditioning = priors(domain, smoke, self.rule)
         automaton = self.rule.automaton(self.config.seed)
-        return Ready(smoke, domain, open_session(automaton, domain, conditioning, self.compute))
+        session = open_session(automaton, domain, conditioning, self.compute)
+        return Ready(smoke, domain, session, layers)
 
     def paint(self, smoke: Volume | Ready, state: RollState) -> Painting:
         """The next frame, of the same lattice, from the state that the one before it left.
@@ -257,76 +202,116 @@ class Roll:
             state: What the frame before it left.
         """
         ready = smoke if isinstance(smoke, Ready) else self.ready(smoke)
-        state = self._stepped(ready, state)
-        parts, coarse = self._parts(ready.domain, state), ready.smoke
+        moment = self._moment(ready.smoke, state.carried)
+        state, parts = self._stepped(ready, state, moment)
         del ready, smoke  # what follows makes arrays of the same order
-        return self._shown(coarse, parts, state)
+        return self._painting(moment, parts, replace(state, carried=moment.carried))
 
-    def _stepped(self, ready: Ready, state: RollState) -> RollState:
-        """The state after the steps of a frame."""
+    def _moment(self, smoke: Volume, carried: Carried | None) -> Moment:
+        """A frame as the direction is asked about it, and what smoke carried to it."""
+        threshold = SMOKE_THRESHOLD * self.rule.scales.density
+        moment = Moment(smoke, self.box, threshold, self.grid, self.inputs)
+        return replace(moment, carried=carry(carried, self.config.parts(), moment))
+
+    def _stepped(self, ready: Ready, state: RollState, moment: Moment) -> tuple[RollState, Parts]:
+        """The state after the steps of a frame, and what is painted, layers over each other."""
+        before = state.layers
+        state = self._advanced(ready, state, moment)
+        parts = self._parts(ready.domain, state, moment)
+        layers = []
+        for number, layer in enumerate(self.layers):
+            left, above = layer._stepped(ready.layers[number], before[number], moment)
+            layers.append(left)
+            share = self.config.share(number, moment, self._places(parts.at))
+            parts = layered(parts, above, share)
+        return replace(state, layers=tuple(layers)), parts
+
+    def _advanced(self, ready: Ready, state: RollState, moment: Moment) -> RollState:
+        """The state of this rule alone after the steps of a frame."""
         domain, session = ready.domain, ready.session
         if session is None:
             return RollState.empty(self.rule.config.channels, state.steps_done)
         warmup = self.config.warmup if len(state.cells) == 0 else 0
-        done = state.steps_done + warmup + self.steps_per_frame
+        done = state.steps_done + warmup
+        steps = self._steps(moment, domain)
+        fewest, most = int(np.min(steps)), int(np.max(steps))
         # What they begin with has no name here, or it would be kept to the last step.
         values = session.run(
-            session.upload(self._begun(ready, state)), range(state.steps_done, done)
+            session.upload(self._begun(ready, state, moment)),
+            range(state.steps_done, done + fewest),
         )
-        return RollState(domain.cells, session.read(values), done, ready.smoke.frame)
+        for step in range(fewest, most):
+            values = _with_rest(session, values, done + step, rest=np.asarray(steps) <= step)
+        return RollState(domain.cells, session.read(values), done + most, ready.smoke.frame)
 
-    def _begun(self, ready: Ready, state: RollState) -> FloatArray:
+    def _steps(self, moment: Moment, domain: Domain) -> AnyArray | int:
+        """How many steps the cells do, all as many or each its own, `[n]`."""
+        if self.config.steps_per_frame is None:
+            return self.rule.config.steps_per_frame
+        asked: Answer = self.config.value("steps_per_frame", moment, domain.cells)
+        return np.rint(asked).astype(int) * self.grid
+
+    def _begun(self, ready: Ready, state: RollState, moment: Moment) -> FloatArray:
         """What the cells of a frame begin with, of the state that the one before it left."""
         smoke, domain = ready.smoke, ready.domain
         if len(state.cells) == 0:
             return domain.seed(self.rule.config.channels)
-        before = Domain(state.cells, domain.box)
-        speed = self.pattern_speed
-        if smoke.velocity_field is None or speed == 0:
+        before, velocity = Domain(state.cells, domain.box), smoke.velocity_field
+        speed = self._pattern_speed(moment, domain)
+        if velocity is None or not np.any(speed):
             return before.carry(state.values, domain)
-        if state.frame is not None:
-            speed *= max(1, smoke.frame - state.frame)
-        return transported(state.values, before, domain, smoke.velocity_field, speed)
+        frames = 1 if state.frame is None else max(1, smoke.frame - state.frame)
+        return transported(state.values, before, domain, velocity, speed * frames)
 
-    def _shown(self, coarse: Volume, parts: _Parts, state: RollState) -> Painting:
+    def _pattern_speed(self, moment: Moment, domain: Domain) -> Answer:
+        """How fast the velocity carries the pattern, everywhere or in each cell, `[n]`."""
+        if self.config.pattern_speed is None:
+            return float(self.rule.config.transport)
+        return self.config.value("pattern_speed", moment, domain.cells)
+
+    def _places(self, at: AnyArray) -> AnyArray:
+        """Where points of the grid of the painting lie, in index coordinates of the automaton's.
+
+        As they are where nobody looks.
+        """
+        if self.finer == 1 or not self.config.asks_for_places:
+            return at
+        return (at + 0.5) / self.finer - 0.5
+
+    def _painting(self, moment: Moment, parts: Parts, state: RollState) -> Painting:
         """The frame as a state shows it, on the grid of the painting."""
-        smoke = coarse.refined(self.finer)
-        box = smoke.box
-        inside = ((parts.at >= box.lower) & (parts.at < box.upper)).all(axis=1)
-        at, colour, factors = parts.at[inside], parts.colour[inside], parts.factors[inside]
-        painted = UNPAINTED + self.config.strength * (colour - UNPAINTED)
-        colour = Field.from_cells(at, painted, box, outside=UNPAINTED)
-        known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
-        colour, known = extrapolated(colour, known, self.colour_dilation * self.finer)
-        colour.values[~known.values] = UNPAINTED
-        factors = Field.from_cells(at, factors, box, outside=1.0)
-        density = smoke.density_field
-        density = replace(density, values=density.values * factors.blocks(density.bricks))
-        colour = replace(colour, outside=UNPAINTED)
-        return Painting.of_fields(smoke, density, colour, state, coarse)
+        smoke = moment.smoke.refined(self.finer)
+        if self.config.fluff and not smoke.box.is_empty:
+            smoke = smoke.within(smoke.box.grown(self.beyond))
+        reach = self.colour_dilation * self.finer
+        density, colour, light = composed(
+            smoke, parts, self.config, moment, self._places, editing=self.editing, reach=reach
+        )
+        return Painting.of_fields(smoke, density, colour, state, moment.smoke, light)
 
-    def _parts(self, domain: Domain, state: RollState) -> _Parts:
-        """What is painted.
+    def _parts(self, domain: Domain, state: RollState, moment: Moment) -> Parts:
+        """What is painted by this rule alone.
 
         Of a decoder, each is the mean over a part of a cell: what is finer than the grid of the
         painting would be grain on it.
         """
-        strength = self.config.density_strength
         if self.rule.decoder is None:
             cells = state.values[:-1]
+            strength = self.config.value("density_strength", moment, state.cells)
             factors = density_factors(cells, strength=strength)
-            return _Parts(state.cells, colours(cells), factors)
+            return Parts(state.cells, colours(cells), factors)
         between = Between(self.rule, self.compute.backend, threads=self.compute.threads)
         parts = self.finer
+        offsets = np.indices(3 * (parts,), np.int32).reshape(3, -1).T
+        at = (state.cells[:, None] * parts + offsets).reshape(-1, 3)
+        at = at.astype(np.int32, copy=False)
+        strength = self.config.value("density_strength", moment, self._places(at))
         colour = np.empty((len(domain), *3 * (parts,), 3), np.float32)
         factors = np.empty(colour.shape[:-1], np.float32)
         for some, seen in parts_of_cells(between, state.values, domain, parts):
             colour[some] = colour_means(seen)
-            factors[some] = density_means(seen, strength=strength)
-        offsets = np.indices(3 * (parts,), np.int32).reshape(3, -1).T
-        at = (state.cells[:, None] * parts + offsets).reshape(-1, 3)
-        at = at.astype(np.int32, copy=False)
-        return _Parts(at, colour.reshape(-1, 3), factors.reshape(-1))
+            factors[some] = density_means(seen, strength=_of_cells(strength, some, parts))
+        return Parts(at, colour.reshape(-1, 3), factors.reshape(-1))
 
     def _domain(self, smoke: Volume) -> Domain:
         """The active cells of a frame."""
@@ -342,6 +327,34 @@ class Roll:
     @cached_property
     def _whole_box(self) -> Domain:
         return Domain.filling(self.box.grown(self.rule.config.dilation))
+
+
+def _with_rest(session: Session, values: Any, number: int, *, rest: AnyArray) -> Any:
+    """A state after a step in which some cells do nothing, `[n]` of them or all."""
+    before = session.read(values).copy()
+    after = session.read(session.run(values, range(number, number + 1))).copy()
+    after[:-1][rest] = before[:-1][rest]
+    return session.upload(after)
+
+
+def _of_cells(answer: Answer, some: slice, parts: int) -> Any:
+    """An answer for all parts of cells, in some of the cells, beside the points in each part."""
+    if isinstance(answer, (int, float)):
+        return answer
+    return answer.reshape(-1, *3 * (parts, 1))[some]
+
+
+def painted(frames: Iterable[Volume], roll: Roll) -> Iterator[Painting]:
+    """Paint a sequence frame by frame, on the lattice of the first that has smoke.
+
+    Raises:
+        GridError: If its cells are not cubic, or a frame can have no place on them.
+    """
+    state = roll.start()
+    for smoke in on_one_lattice(frames):
+        painting = roll.paint(smoke.refined(roll.grid), state)
+        state = painting.state
+        yield painting
 
 
 def stylize(
@@ -363,9 +376,4 @@ def stylize(
     Raises:
         GridError: If its cells are not cubic, or a frame can have no place on them.
     """
-    roll = Roll(rule, config, box, compute or Compute()).refined(refine)
-    state = roll.start()
-    for smoke in on_one_lattice(frames):
-        painting = roll.paint(smoke.refined(roll.grid), state)
-        state = painting.state
-        yield painting
+    return painted(frames, Roll(rule, config, box, compute or Compute()).refined(refine))

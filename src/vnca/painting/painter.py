@@ -278,6 +278,8 @@ class Painter:
             refine=self.refine,
             provenance=self._provenance(read),
             file=read.file,
+            emission=painting.emission,
+            beyond=self.roll.beyond,
         )
         return painting.state
 

@@ -6,12 +6,13 @@ import numpy as np
 
 from vnca.core import FloatArray
 from vnca.core.field import Field
+from vnca.direction.mixing import Answer
 from vnca.engine.domain import Domain
 from vnca.io.velocity import interpolated
 
 
 def transported(
-    state: FloatArray, before: Domain, after: Domain, velocity: Field, frames: float
+    state: FloatArray, before: Domain, after: Domain, velocity: Field, frames: Answer
 ) -> FloatArray:
     """The state `[m + 1, C]` on other cells, after the velocity has carried it for some time.
 
@@ -20,7 +21,7 @@ def transported(
         before: Its cells.
         after: Those wanted.
         velocity: `[..., 3]`, cells per frame.
-        frames: The time; below zero it goes back.
+        frames: The time, one or of each cell `[m]`; below zero it goes back.
     """
     rows, shares = before.sources(after, _moved(after, velocity, frames))
     carried = np.zeros((len(after) + 1, state.shape[1]), state.dtype)
@@ -29,10 +30,11 @@ def transported(
     return carried
 
 
-def _moved(domain: Domain, velocity: Field, frames: float) -> FloatArray:
+def _moved(domain: Domain, velocity: Field, frames: Answer) -> FloatArray:
     """By how much what is at each cell has come to it, `[m, 3]`: a midpoint step back."""
-    moved = np.multiply(velocity.gather(domain.cells), frames, dtype=np.float32)
+    time = np.broadcast_to(np.float32(frames), len(domain))[:, None]
+    moved = time * velocity.gather(domain.cells)
     known = replace(velocity, values=velocity.values.any(axis=-1), outside=False)
     halfway, found = interpolated(velocity, known, domain.cells - 0.5 * moved)
-    moved[found] = frames * halfway[found]
+    moved[found] = time[found] * halfway[found]
     return moved

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,10 +12,13 @@ from safetensors.numpy import save
 
 from vnca.core.errors import FileFormatError, OptionError
 from vnca.core.files import existing_file, whole_file
+from vnca.direction import Carried
 from vnca.painting import Roll, RollState
 
 _METADATA = "vnca"
 _LONGEST_VALUE = 40
+_CELLS, _VALUES = "cells.{}", "values.{}"
+_CARRIED_CELLS, _CARRIED = "carried cells", "carried "
 
 
 class Source(NamedTuple):
@@ -49,16 +52,17 @@ class Unfinished:
         Raises:
             OutputError: If it cannot be written.
         """
+        states = (self.state, *self.state.layers)
         described = {
             "conditions": self.conditions,
             "sources": self.sources,
-            "steps_done": self.state.steps_done,
-            "frame": self.state.frame,
+            "steps_done": [state.steps_done for state in states],
+            "frames": [state.frame for state in states],
         }
-        tensors = {
-            "cells": np.ascontiguousarray(self.state.cells),
-            "values": np.ascontiguousarray(self.state.values[:-1]),
-        }
+        tensors = _carried_tensors(self.state.carried)
+        for number, state in enumerate(states):
+            tensors[_CELLS.format(number)] = np.ascontiguousarray(state.cells)
+            tensors[_VALUES.format(number)] = np.ascontiguousarray(state.values[:-1])
         with whole_file(path) as temporary:
             # Not by safetensors itself, which has an error of its own for a full disk.
             temporary.write_bytes(save(tensors, {_METADATA: json.dumps(described)}))
@@ -77,13 +81,21 @@ class Unfinished:
                 described = json.loads((file.metadata() or {})[_METADATA])
                 _require_same(path.parent, described["conditions"], conditions)
                 sources = tuple(s and Source(*map(int, s)) for s in described["sources"])
-                state = _state(
-                    file.get_tensor("cells"),
-                    file.get_tensor("values"),
-                    int(described["steps_done"]),
-                    described["frame"],
-                    roll,
+                rolls, steps = (roll, *roll.layers), described["steps_done"]
+                state, *layers = (
+                    _state(
+                        file.get_tensor(_CELLS.format(number)),
+                        file.get_tensor(_VALUES.format(number)),
+                        int(done),
+                        frame,
+                        each,
+                    )
+                    for number, (each, done, frame) in enumerate(
+                        zip(rolls, steps, described["frames"], strict=True)
+                    )
                 )
+                carried = _carried({n: file.get_tensor(n) for n in file.keys()})  # noqa: SIM118
+                state = replace(state, layers=tuple(layers), carried=carried)
         except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
             raise FileFormatError(
                 f"{path}: damaged ({error}); start anew without `resume`"
@@ -122,3 +134,32 @@ def _state(cells: Any, values: Any, steps_done: int, frame: Any, roll: Roll) -> 
     outside = np.zeros((1, values.shape[1]), dtype=np.float32)
     values = np.concatenate([values, outside])
     return RollState(cells, values, steps_done, None if frame is None else int(frame))
+
+
+def _carried_tensors(carried: Carried | None) -> dict[str, Any]:
+    if carried is None:
+        return {}
+    values = {_CARRIED + name: value for name, value in carried.values.items()}
+    return {_CARRIED_CELLS: np.ascontiguousarray(carried.cells), **values}
+
+
+def _carried(tensors: Mapping[str, Any]) -> Carried | None:
+    """What `_carried_tensors` was given, after a look as `_state` has.
+
+    Raises:
+        ValueError: If it does not fit together.
+    """
+    cells = tensors.get(_CARRIED_CELLS)
+    if cells is None:
+        return None
+    values = {
+        name.removeprefix(_CARRIED): value
+        for name, value in tensors.items()
+        if name.startswith(_CARRIED) and name != _CARRIED_CELLS
+    }
+    kinds = {(value.shape, value.dtype) for value in values.values()}
+    if (cells.dtype, cells.shape[1:]) != (np.int32, (3,)) or kinds != {
+        ((len(cells),), np.dtype(np.float32))
+    }:
+        raise ValueError(f"carried: cells {cells.shape} {cells.dtype} with values {kinds}")
+    return Carried(cells, values)

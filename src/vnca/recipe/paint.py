@@ -14,6 +14,9 @@ import vnca
 from vnca.core.errors import FileFormatError, OptionError, OutputError
 from vnca.core.files import existing_file, whole_file, writable_folder
 from vnca.core.records import changed, changed_fields, distributed
+from vnca.direction import Direction
+from vnca.direction.shot import SUFFIX as SHOT
+from vnca.direction.shot import Shot
 from vnca.io import SmokeFormat, read_smoke
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import NO_VELOCITY
@@ -60,10 +63,6 @@ class PaintRun:
     """Paint on a grid so many times as fine as that of the smoke, at most 8."""
     seed: int = 0
     """Same seed, same machine, same painting."""
-    strength: float = StylizeConfig.strength
-    """Colour of the painting, from 0 (white smoke) to 1."""
-    density_strength: float = StylizeConfig.density_strength
-    """How much the painting changes the density, from 0 (not at all) to 1."""
     device: str = "auto"
     """Where: auto, cpu, cuda, or as cuda:1."""
     memory_budget: str = "auto"
@@ -76,15 +75,14 @@ class PaintRun:
     """Paint only, without a film of it."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
+    direction: Direction = field(default_factory=Direction)
+    """What is asked of the painting."""
     film: FilmConfig = field(default_factory=FilmConfig)
     """How the painting is filmed."""
 
     def __post_init__(self) -> None:
-        StylizeConfig(strength=self.strength, density_strength=self.density_strength)
         if self.without_film and (shaped := changed_fields(self.film, FilmConfig())):
             raise OptionError(f"`film.{shaped[0]}`, `without_film`: one of them, not both")
-        if (self.picture is None) == (self.style is None):
-            raise OptionError("`picture`, `style`: expected one of them")
         if self.style is not None:
             require_style(self.style)
         if self.resume and self.overwrite:
@@ -93,11 +91,22 @@ class PaintRun:
         if idle and self.is_trained:
             raise OptionError(f"`{idle[0]}`: {self.name} is a model, which is trained already")
 
+    def require_one_style(self) -> None:
+        """Refuse two pictures to paint by, and none.
+
+        Raises:
+            OptionError: If there is not one.
+        """
+        if (self.picture is None) == (self.style is None):
+            raise OptionError("`picture`, `style`: expected one of them")
+
     @property
     def is_trained(self) -> bool:
         """Whether a model is given rather than a picture."""
         path = self.picture
-        return path is None or path.suffix.lower() == MODEL_SUFFIX or path.is_dir()
+        if path is None:
+            return self.style is not None
+        return path.suffix.lower() == MODEL_SUFFIX or path.is_dir()
 
     @property
     def name(self) -> str:
@@ -106,7 +115,7 @@ class PaintRun:
 
 
 def paint(
-    sequence: str | Path,
+    sequence: str | Path | Shot,
     picture: str | Path | None = None,
     out: str | Path | None = None,
     *,
@@ -116,8 +125,6 @@ def paint(
     frames: str | None = None,
     refine: int = 2,
     seed: int = 0,
-    strength: float = StylizeConfig.strength,
-    density_strength: float = StylizeConfig.density_strength,
     device: str = "auto",
     memory_budget: str = "auto",
     resume: bool = False,
@@ -130,7 +137,8 @@ def paint(
     """Paint a sequence of smoke in the style of a picture, as `vnca paint` does.
 
     Args:
-        sequence: A folder, a pattern (`smoke_####.vdb`) or a file.
+        sequence: A folder, a pattern (`smoke_####.vdb`) or a file; or a shot, or its file
+            (`shot.toml`), whose options hold where nothing else is given here.
         picture: A picture to learn from; or a model, or the folder of a run.
         out: Folder for the run of the training, the painted frames and the film.
         style: A style of the library, in the place of a picture.
@@ -139,8 +147,6 @@ def paint(
         frames: Which frames to paint, such as `30-53`; all unless given.
         refine: Paint on a grid so many times as fine as the smoke's.
         seed: Same seed, same machine, same painting.
-        strength: Colour of the painting, from 0 (white smoke) to 1.
-        density_strength: How much it changes the density, from 0 (not at all) to 1.
         device: Where to compute: `auto`, `cpu`, `cuda`, or such as `cuda:1`.
         memory_budget: Memory for the training, such as `12GB`.
         resume: Go on where an earlier call was interrupted, or else begin.
@@ -148,8 +154,9 @@ def paint(
         without_film: Paint only.
         film: How it is filmed: a `FilmConfig`, or some of its fields.
         watch: Is told how far it has come, and may cancel.
-        **options: Fields of `SmokeFormat` (`velocity_units="mantaflow"`); in the place of those
-            that were recorded where `picture` is a model.
+        **options: Fields of `Direction` (`strength="@mask"`); and of `SmokeFormat`
+            (`velocity_units="mantaflow"`), in the place of those that were recorded where `picture`
+            is a model.
 
     Returns:
         The painted files.
@@ -159,20 +166,21 @@ def paint(
             memory runs out.
         KeyboardInterrupt: If it is cancelled; the folder holds what it takes to resume.
     """
-    if out is None:
+    shot = sequence if isinstance(sequence, Shot) else None
+    if shot is None and Path(sequence).suffix == SHOT:  # type: ignore[arg-type]
+        shot = Shot.load(sequence)  # type: ignore[arg-type]
+    if out is None and (shot is None or "out" not in shot.values):
         raise OptionError("`out`: a folder is needed")
     asked = PaintRun(
-        sequence=str(sequence),
+        sequence="" if shot else str(sequence),
         picture=None if picture is None else Path(picture),
         style=style,
-        out=Path(out),
+        out=Path(out or ""),
         preset=str(preset),
         training_frame=training_frame,
         frames=frames,
         refine=refine,
         seed=seed,
-        strength=strength,
-        density_strength=density_strength,
         device=device,
         memory_budget=memory_budget,
         resume=resume,
@@ -180,8 +188,27 @@ def paint(
         without_film=without_film,
         film=changed("film", FilmConfig(), film),
     )
-    (smoke,) = distributed(options, recorded_format(asked))
-    return [path for path in run(dataclasses.replace(asked, smoke=smoke), watch) if path]
+    if shot is not None:
+        asked = over_shot(asked, shot.applied(PaintRun(sequence="", out=Path())))
+    smoke, direction = distributed(options, recorded_format(asked), asked.direction)
+    asked = dataclasses.replace(asked, smoke=smoke, direction=direction)
+    return [path for path in run(asked, watch) if path]
+
+
+def over_shot(given: PaintRun, shot: PaintRun) -> PaintRun:
+    """Options of a shot, in the place of which stand those that are given and not the default."""
+    changes = {
+        name: getattr(given, name)
+        for name in changed_fields(given, PaintRun(sequence="", out=Path()))
+    }
+    for name, other, none in (
+        ("style", "picture", None),
+        ("picture", "style", None),
+        ("without_film", "film", FilmConfig()),
+    ):
+        if name in changes:
+            changes.setdefault(other, none)
+    return dataclasses.replace(shot, **changes)
 
 
 def recorded_format(options: PaintRun) -> SmokeFormat:
@@ -200,6 +227,7 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
     Raises:
         VncaError: As `paint` does.
     """
+    options.require_one_style()
     sequence = open_sequence(options.sequence, options.frames, watch)
     goes_on = _begin(options)
     model, smoke, scales = options.picture or Path(options.name), options.smoke, _Scales()
@@ -228,13 +256,15 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
         density_scale=scales.density,
         device=options.device,
         smoke=smoke,
-        config=StylizeConfig(
-            strength=options.strength, density_strength=options.density_strength, seed=options.seed
-        ),
+        config=StylizeConfig(**_fields(options.direction), seed=options.seed),
         film=options.film,
     )
     with closing(painting.run(asked, watch, style)) as paths:  # type: ignore[type-var]
         yield from paths
+
+
+def _fields(direction: Direction) -> dict[str, Any]:
+    return {field.name: getattr(direction, field.name) for field in dataclasses.fields(direction)}
 
 
 def _begin(options: PaintRun) -> bool:
@@ -275,6 +305,7 @@ def _asked(options: PaintRun) -> dict[str, Any]:
     """What has to be the same to go on, as JSON values."""
     asked = {k: v for k, v in recorded(options).items() if k not in (*_ANY_TIME, "film")}
     path = options.picture and str(options.picture.absolute())
+    asked |= asked.pop("direction")  # one by one, to be named if one is another
     asked |= {"picture": path, "vnca": vnca.__version__}
     if not options.is_trained:
         # A file of a user may have been changed.

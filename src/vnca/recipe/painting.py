@@ -1,7 +1,6 @@
 """Painting a sequence of smoke with a trained rule: from files to files, or in memory."""
 
 import dataclasses
-import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
@@ -22,7 +21,8 @@ from vnca.io.provenance import read_provenance
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.painting import Roll, StylizeConfig
 from vnca.painting.painter import OnError, Painter
-from vnca.recipe import Watch
+from vnca.recipe import Watch, recorded
+from vnca.recipe.directing import digest, directed
 from vnca.recipe.film import Film, FilmConfig, Shown
 from vnca.recipe.sequence import (
     open_sequence,
@@ -31,7 +31,6 @@ from vnca.recipe.sequence import (
     require_dense_enough,
     sequence_region,
 )
-from vnca.rule import Rule
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.paint import require_refinement
 
@@ -101,6 +100,10 @@ class StylizeRun:
             )
 
 
+_TOLD = ("strength", "density_strength", "steps_per_frame", "domain")
+"""What painted files tell one by one."""
+
+
 def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterator[Path | None]:
     """Make ready to paint as asked; memory does not grow with the length of the sequence.
 
@@ -131,7 +134,10 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
     rule = placed(rule, region, watch)
     compute = compute_of(options.backend, options.device, options.precision)
     backend = choose(compute).name
-    roll = Roll(rule, options.config, region.box, compute).refined(options.refine)
+    ready = directed(
+        Roll(rule, options.config, region.box, compute), model, options.refine, sequence, smoke
+    )
+    roll = ready.roll
     facts = _facts(options, model, roll)
     painter = Painter(
         sequence,
@@ -144,7 +150,7 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
         conditions={
             "the version of vnca": vnca.__version__,
             "`refine`": options.refine,
-            "the model": _digest(rule),
+            "the model": digest(rule),
             "the list of frames": [frame.path.name for frame in sequence],
             "the place of its cells in the world": region.lattice.to_world.tolist(),
             "the box of the smoke": region.box,
@@ -158,28 +164,17 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
             **{
                 f"`{name}`": value
                 for values in (options.config, smoke)
-                for name, value in dataclasses.asdict(values).items()
+                for name, value in recorded(values).items()
             },
             "`steps_per_frame`": roll.steps_per_frame,
             "`domain`": roll.domain_kind,
+            **ready.conditions,
         },
         tell=watch.note,
         refine=options.refine,
         facts=facts,
     )
     return _paint(painter, options, watch)
-
-
-def _digest(rule: Rule) -> str:
-    """Equal for rules that paint equally."""
-    shape = dataclasses.asdict(rule.config)
-    place = rule.place and [rule.place.lattice.to_world.tolist(), rule.place.box]
-    described = json.dumps([shape, rule.scales.velocity, place])
-    digest = hashlib.blake2b(described.encode(), digest_size=16)
-    decoder = rule.decoder.weights if rule.decoder is not None else ()
-    for weights in (rule.hidden, rule.bias, rule.output, *decoder):
-        digest.update(weights.tobytes())
-    return digest.hexdigest()
 
 
 def _paint(painter: Painter, options: StylizeRun, watch: Watch) -> Iterator[Path | None]:
@@ -244,7 +239,10 @@ def _facts(options: StylizeRun, model: Model, roll: Roll) -> dict[str, str | int
     path = options.model.resolve()
     name = path.parent.name if path.name == MODEL_NAME else path.stem
     config = options.config
+    asked = changed_fields(config, StylizeConfig(warmup=config.warmup, seed=config.seed))
+    further = {n: recorded(config)[n] for n in asked if n not in _TOLD}
     return {
+        **({"direction": json.dumps(further)} if further else {}),
         "version": vnca.__version__,
         "model": name,
         "style": str(model.training.get("style", "")),

@@ -15,11 +15,11 @@ from vnca.core.volume import Volume
 from vnca.engine import compute_of
 from vnca.io import with_fitted_scale
 from vnca.io.sequence import find_frames
-from vnca.painting import Painting
-from vnca.painting import stylize as stylize_volumes
+from vnca.painting import Painting, Roll, painted
 from vnca.painting.frames import VelocityCheck, require_dense
 from vnca.painting.painter import OnError
 from vnca.recipe import SILENT, Watch, applied, tracked
+from vnca.recipe.directing import directed
 from vnca.recipe.film import FilmConfig, Shown
 from vnca.recipe.painting import StylizeRun, read_painted, run
 from vnca.recipe.sequence import (
@@ -170,6 +170,7 @@ def _in_memory(
 ) -> Iterator[PaintedFrame]:
     """What paints a sequence of files, or volumes, and keeps nothing."""
     rule = model.rule.rescaled(density=options.density_scale, gamma=options.gamma)
+    sequence, smoke = None, options.smoke
     if given is None:
         sequence = open_sequence(options.sequence, options.frames, watch)
         smoke = with_fitted_scale(options.smoke, sequence)
@@ -181,17 +182,12 @@ def _in_memory(
         laid, region = region_of(given)
         densities = (volume.density_field.values for volume in laid)
         require_dense(densities, rule.scales.density, "`sequence`")
-        check = VelocityCheck(rule, options.smoke, watch.note)
+        check = VelocityCheck(rule, smoke, watch.note)
         count, read = len(laid), check.watched(laid, [None] * len(laid))
     rule = placed(rule, region, watch)
-    paintings = stylize_volumes(
-        read,
-        rule,
-        options.config,
-        box=region.box,
-        refine=options.refine,
-        compute=compute_of(options.backend, options.device, options.precision),
-    )
+    compute = compute_of(options.backend, options.device, options.precision)
+    roll = Roll(rule, options.config, region.box, compute)
+    roll = directed(roll, model, options.refine, sequence, smoke).roll
     refined = rule.refined(options.refine)
 
     def frame(painting: Painting) -> PaintedFrame:
@@ -199,4 +195,4 @@ def _in_memory(
         shown = Shown(smoke, painting.colour, refined.scales.extinction(smoke.cell_length))
         return PaintedFrame(smoke.frame, None, lambda: shown)
 
-    return map(frame, tracked(paintings, watch, "painting", count, "frames"))
+    return map(frame, tracked(painted(read, roll), watch, "painting", count, "frames"))

@@ -22,10 +22,11 @@ def colours(state: FloatArray) -> FloatArray:
     return srgb_to_linear(np.clip(state[..., COLOUR] + 0.5, 0, 1)).astype(np.float32)
 
 
-def density_factors(state: FloatArray, *, strength: float = 1.0) -> FloatArray:
+def density_factors(state: FloatArray, *, strength: float | FloatArray = 1.0) -> FloatArray:
     """1 + Δd `[...]` of states, or of what is seen of them, `[..., C]`.
 
-    It is what the input density is multiplied by, from 0.5 to 1.5.
+    It is what the input density is multiplied by, from 0.5 to 1.5; with another strength, one for
+    all or for each, nearer to 1.
     """
     change = np.clip(state[..., DENSITY_CHANGE], -DENSITY_LIMIT, DENSITY_LIMIT)
     return 1 + strength * change
@@ -128,6 +129,6 @@ def colour_means(seen: FloatArray) -> FloatArray:
     return colours(seen).mean((2, 4, 6))
 
 
-def density_means(seen: FloatArray, *, strength: float) -> FloatArray:
+def density_means(seen: FloatArray, *, strength: float | FloatArray) -> FloatArray:
     """Factors of the density `[m, parts, parts, parts]` of what `parts_of_cells` gives."""
     return density_factors(seen, strength=strength).mean((2, 4, 6))

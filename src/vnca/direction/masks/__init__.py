@@ -1,0 +1,1 @@
+"""Where a value holds: grids of files, shapes, pictures, meshes."""

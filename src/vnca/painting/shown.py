@@ -1,0 +1,125 @@
+"""From what a rule painted, place by place, to the fields of a painted frame."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vnca.core import AnyArray, Box, FloatArray, IntArray
+from vnca.core.field import Field
+from vnca.core.volume import Volume, dense, field_of
+from vnca.direction import Direction, Moment
+from vnca.direction.colour import Editing
+from vnca.direction.mixing import Parts, per_colour
+from vnca.direction.silhouette import of_mass
+from vnca.io.velocity import extrapolated
+
+if TYPE_CHECKING:
+    from vnca.painting import RollState
+
+UNPAINTED = 1.0
+"""Linear colour of smoke far from all that the rule paints: white."""
+COLOUR_DILATION = 3
+"""How many cells beyond the active ones their colour goes on, so that faint smoke is no pale seam
+where a renderer interpolates it."""
+
+
+@dense("density", "colour", what=lambda painting: f"frame {painting.smoke.frame}")
+@dataclass(frozen=True, eq=False)
+class Painting:
+    """One painted frame, on the same cells as its smoke.
+
+    Attributes:
+        smoke: The frame as it was read, on the grid of the painting.
+        density: `[x, y, z]`, painted, in the units of the file; the array is made when it is asked
+            for, as the smoke's is.
+        colour: Likewise, linear RGB `[x, y, z, 3]`; beside the active cells continued from them,
+            white farther away.
+        state: What it leaves to the next frame.
+        coarse: The frame on the grid of the automaton; None where that is not known.
+        emission: The light that it gives, linear RGB `[x, y, z, 3]`, where any was asked for.
+    """
+
+    smoke: Volume
+    density: FloatArray
+    colour: FloatArray
+    state: "RollState"
+    coarse: Volume | None = None
+    emission: Field | None = None
+
+    @classmethod
+    def of_fields(
+        cls,
+        smoke: Volume,
+        density: Field,
+        colour: Field,
+        state: "RollState",
+        coarse: Volume,
+        emission: Field | None = None,
+    ) -> "Painting":
+        """A painting given by where there is smoke and colour."""
+        painted: Any = density
+        coloured: Any = colour
+        return cls(smoke, painted, coloured, state, coarse, emission)
+
+    @cached_property
+    def density_field(self) -> Field:
+        """The density where there is any."""
+        return field_of(self, "density", self.smoke.origin)
+
+    @cached_property
+    def colour_field(self) -> Field:
+        """The colour where it is not white."""
+        return field_of(self, "colour", self.smoke.origin, outside=UNPAINTED)
+
+
+def composed(
+    smoke: Volume,
+    parts: Parts,
+    direction: Direction,
+    moment: Moment,
+    places: Callable[[AnyArray], AnyArray],
+    *,
+    editing: Editing,
+    reach: int,
+) -> tuple[Field, Field, Field | None]:
+    """Density, colour and, if anything burns, light of a frame.
+
+    Args:
+        smoke: The frame, on the grid of the painting.
+        parts: What was painted on that grid.
+        direction: What is asked of the painting.
+        moment: The frame, as it is asked about.
+        places: Where points of that grid lie in index coordinates of the moment's smoke.
+        editing: What is done with colours as a whole.
+        reach: How many cells beyond what was painted its colour goes on.
+    """
+    box = smoke.box
+    inside = ((parts.at >= box.lower) & (parts.at < box.upper)).all(axis=1)
+    at, colour, factors = parts.at[inside], parts.colour[inside], parts.factors[inside]
+    there = places(at)
+    colour = direction.coloured(colour, moment, there, editing)
+    strength = per_colour(direction.value("strength", moment, there))
+    colour = _continued(at, UNPAINTED + strength * (colour - UNPAINTED), box, UNPAINTED, reach)
+    factors = direction.outlined(factors, moment, there)
+    factors = Field.from_cells(at, factors, box, outside=1.0)
+    before = smoke.density_field
+    density = replace(before, values=before.values * factors.blocks(before.bricks))
+    density, colour = direction.fluffed(density, colour, factors, moment, places)
+    if direction.keep_mass:
+        density = replace(density, values=of_mass(density, before))
+    light = None
+    if direction.burns:
+        light = _continued(at, direction.emission(moment, there), box, 0.0, reach)
+    return density, colour, light
+
+
+def _continued(at: IntArray, values: FloatArray, box: Box, outside: float, reach: int) -> Field:
+    """Vectors at points, going on for some cells around them; `outside` farther away."""
+    field = Field.from_cells(at, values, box, outside=outside)
+    known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
+    field, known = extrapolated(field, known, reach)
+    field.values[~known.values] = outside
+    return replace(field, outside=outside)
