@@ -238,7 +238,10 @@ def option_name(kind: type, field: str) -> str | None:
 
     Empty for a dataclass whose own fields are options as if they were of the one around it.
     """
-    return (SHOT_NAMES if issubclass(kind, Shot) else NAMES).get(field)
+    name = (SHOT_NAMES if issubclass(kind, Shot) else NAMES).get(field)
+    # A number may be called like a dataclass elsewhere.
+    inside = name != "" or dataclasses.is_dataclass(get_type_hints(kind)[field])
+    return name if inside else None
 
 
 def as_option(argument: str) -> str:
