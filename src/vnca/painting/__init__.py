@@ -152,6 +152,11 @@ class Ready(NamedTuple):
     domain: Domain
     session: Session | None
 
+    @property
+    def frame(self) -> int:
+        """Its number in the sequence."""
+        return self.smoke.frame
+
 
 @dataclass(frozen=True, eq=False)
 class Roll:
