@@ -145,6 +145,17 @@ def test_a_roll_goes_on_from_the_state_a_painting_left() -> None:
         assert again.state.steps_done == after.state.steps_done
 
 
+def test_a_frame_made_ready_beforehand_is_painted_the_same() -> None:
+    roll = Roll(RULE, StylizeConfig(warmup=6, steps_per_frame=2), BOX)
+    frames = [ball(0), nothing(1), ball(2, (2, 0, 0))]
+    state = roll.start()
+    for smoke, ready in zip(frames, [roll.ready(smoke) for smoke in frames], strict=True):
+        painting, right = roll.paint(ready, state), roll.paint(smoke, state)
+        np.testing.assert_array_equal(painting.colour, right.colour)
+        np.testing.assert_array_equal(painting.state.values, right.state.values)
+        state = painting.state
+
+
 def test_neighbours_are_forgotten_before_colour_is_continued(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -100,6 +100,11 @@ class Ready(NamedTuple):
     session: Session | None
     layers: tuple["Ready", ...] = ()
 
+    @property
+    def frame(self) -> int:
+        """Its number in the sequence."""
+        return self.smoke.frame
+
 
 @dataclass(frozen=True, eq=False)
 class Roll:
