@@ -7,8 +7,13 @@ training: of a picture here, drawn by pictures.py, or in the package, each with
 
     vnca train FRAME PICTURE --graft none --texture 4 --iterations 200 --pool.reseed-every 40 -s 1
 
-which takes a quarter of an hour on a core, and makes states live for 640 steps: as long as films
-are. Harvest and woodcut come from an earlier build: woodcut came out in blots by this one.
+and then, gone on with as a pattern that the smoke carries,
+
+    vnca train FRAME PICTURE --init RUN --iterations 300 --pool.reseed-every 40 -s 1
+
+The first was made before rules were carried (`--no-transport --steadiness 0 --motion.weight 0.3`
+does that now). The café went on for 120 iterations at a steadiness of 2 and for 120 at 1, as 300 at
+0.5 left it pale. States live for 640 steps: as long as films are.
 What a model tells of the smoke that it was trained on is left out: the library paints
 other smoke.
 """
