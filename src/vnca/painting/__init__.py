@@ -266,7 +266,9 @@ class Roll:
         if velocity is None or not np.any(speed):
             return before.carry(state.values, domain)
         frames = 1 if state.frame is None else max(1, smoke.frame - state.frame)
-        return transported(state.values, before, domain, velocity, speed * frames)
+        return transported(
+            state.values, before, domain, velocity, speed * frames, threads=self.compute.threads
+        )
 
     def _pattern_speed(self, moment: Moment, domain: Domain) -> Answer:
         """How fast the velocity carries the pattern, everywhere or in each cell, `[n]`."""
