@@ -40,7 +40,7 @@ def test_steps_are_compared_and_kept(vnca: Vnca, tmp_path: Path) -> None:
     assert outcome.out.count("×") == 6
     document = json.loads(report.read_text())
     assert document["device"]
-    assert document["gemm_gflops"] > 0
+    assert document["peak_gflops"] > 0
     assert len(document["rows"]) == 6
     keys = [
         "backend",
@@ -64,7 +64,7 @@ def test_rows_can_be_printed_for_programs(vnca: Vnca) -> None:
     assert outcome.code == 0, outcome.err
     document = json.loads(outcome.out)
     assert [row["backend"] for row in document["rows"]] == ["reference"]
-    assert document["gemm_gflops"] > 0
+    assert document["peak_gflops"] > 0
     assert "ns a cell" in outcome.err
 
 
@@ -79,7 +79,7 @@ def test_no_speed_up_is_told_of_backends_that_disagree(
     kept = ("--json", report, "--csv", table)
     outcome = vnca(*STEP, "--backends", "plain,native", *kept)
     assert "disagree" in outcome.complaint
-    assert "native: state is off by" in outcome.complaint
+    assert "native: gradient of the state is off by" in outcome.complaint
     assert "×" not in outcome.out
     assert not list(tmp_path.iterdir())
 

@@ -216,5 +216,5 @@ def test_strengths_say_how_much_of_the_painting_is_seen(
 def test_a_film_is_shaped_or_left_out(vnca: Vnca, smoke: Path, tmp_path: Path) -> None:
     given = (smoke, "--style", "ink", "-o", tmp_path / "out", "--without-film")
     assert "--rows, --without-film: one of them" in vnca("paint", *given, "--rows", 32).complaint
-    assert "--strength 2.0: must be" in vnca("paint", *given, "--strength", 2).complaint
+    assert "--strength 2: must be" in vnca("paint", *given, "--strength", 2).complaint
     assert not (tmp_path / "out").exists()

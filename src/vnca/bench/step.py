@@ -27,9 +27,9 @@ from vnca.bench.contenders import (
 )
 from vnca.core import Index
 from vnca.core.errors import OptionError
-from vnca.engine import device_named
+from vnca.engine import device_named, native
 from vnca.engine.automaton import NEIGHBOURS
-from vnca.engine.native import default_threads, multiply_adds, unavailable
+from vnca.engine.native import default_threads, multiply_adds
 from vnca.rule import PRIORS
 
 ARRAYS = ("state", "gradient of the state", "gradient of W1", "gradient of b1", "gradient of W2")
@@ -74,7 +74,7 @@ def arithmetic(place: Place, threads: int) -> Peak:
     How fast a GEMM is depends on its library and sizes, and on the CPU varies from run to run.
     """
     precision = "bfloat16" if place.dtype == torch.bfloat16 else "float32"
-    if place.device != "cpu" or unavailable(precision) is not None:
+    if place.device != "cpu" or native.unavailable(precision) is not None:
         return gemm(place)
     operations = multiply_adds(1, precision=precision, threads=threads)
     work = partial(multiply_adds, _ROUNDS, precision=precision, threads=threads)

@@ -17,7 +17,6 @@ from vnca.direction.mixing import Answer
 from vnca.engine.domain import Domain
 from vnca.io.velocity import interpolated
 
-
 CHUNK = 1 << 15
 """Cells that are carried at a time: what that takes fits into a cache."""
 
