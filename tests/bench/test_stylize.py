@@ -11,7 +11,7 @@ from vnca.core import FloatArray
 from vnca.core.errors import DisagreementError
 from vnca.core.volume import Volume
 from vnca.engine import native
-from vnca.engine import native as native_backend
+from vnca.engine.native.bricks import BrickSession
 from vnca.io import SmokeFormat, write_smoke
 from vnca.io.sequence import find_frames
 
@@ -61,15 +61,15 @@ def test_the_native_kernel_paints_in_bfloat16_and_the_reference_does_not(
 def test_nothing_is_timed_when_a_backend_paints_something_else(
     painted: PaintedSequence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ours = native_backend._update
+    ours = BrickSession.read
 
-    def careless(state: FloatArray, *rest: Any, **options: Any) -> FloatArray:
-        return state + 1.1 * (ours(state, *rest, **options) - state)
+    def careless(self: BrickSession, state: Any) -> FloatArray:
+        return 1.1 * ours(self, state)
 
     def never(*arguments: Any) -> None:
         pytest.fail("timed")
 
-    monkeypatch.setattr(native_backend, "_update", careless)
+    monkeypatch.setattr(BrickSession, "read", careless)
     monkeypatch.setattr(stylize, "in_turns", never)
     with pytest.raises(DisagreementError, match="native: state after a frame"):
         measure_stylizing(painted, ("numpy", "native"), threads=1, repeats=1)

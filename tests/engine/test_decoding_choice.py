@@ -44,7 +44,7 @@ def test_a_gpu_gets_triton(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_unknown_backends_are_refused() -> None:
     for choose in (torch_decode, array_decode):
         with pytest.raises(
-            OptionError, match="fast: expected auto, native, triton, numpy, reference"
+            OptionError, match="fast: expected auto, native, triton, wgsl, numpy, reference"
         ):
             choose("fast")
 

@@ -27,10 +27,11 @@ def test_no_change_is_the_identity(clip: Clip) -> None:
 @pytest.mark.parametrize("changes", ["velocity", "density"])
 def test_it_comes_nearer_to_the_picture(clip: Clip, look: Look, changes: str) -> None:
     losses: list[float] = []
-    rate = {"velocity": 0.2, "density": 0.05}[changes]
+    # Factors can only darken or brighten what is there.
+    rate, share = {"velocity": (0.2, 0.9), "density": (0.05, 0.95)}[changes]
     settings = dataclasses.replace(SETTINGS, iterations=8, changes=changes, rate=rate)
     found = aurand(clip, look, settings, lambda done, total, loss: losses.append(loss or 0.0))
-    assert losses[-1] < 0.9 * losses[0]
+    assert losses[-1] < share * losses[0]
     assert found.shape == clip.density.shape
     assert found.min() >= 0
     assert len(losses) == 8
