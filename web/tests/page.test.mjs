@@ -39,7 +39,8 @@ const pixels = (page, size = 64) =>
   page.evaluate(async (size) => [...(await viewer.stage.pixels(size, size))], size);
 
 const told = JSON.parse(readFileSync(join(MATERIAL, "reference.json")));
-for (const [style, refine] of [["ink", 1], ["church", 1], ["ink", 2]]) {
+const same = [["ink", 1], ["church", 1], ["ink", 2], ["carried", 1], ["carried", 2], ["standing", 1]];
+for (const [style, refine] of same) {
   test(`${style} at detail ${refine} steps and looks as vnca's own painting`, slow, async () => {
     const got = await still.page.evaluate(paintAll, [style, refine, told.config, told.size]);
     const { cells, channels } = told.styles[style][refine];
@@ -98,6 +99,69 @@ async function paintAll([style, refine, config, size]) {
   viewer.reframe();
   return result;
 }
+
+test("carried patterns and standing ones are not the same", () => {
+  const [carried, standing] = ["carried_1.state", "standing_1.state"].map(floats);
+  const first = 12 * told.styles.carried[1].cells[0];
+  assert.ok(apart([...carried.subarray(first)], [...standing.subarray(first)]) > 1e-3);
+});
+
+test("the velocity carries over frames that are skipped, as fast as is asked for", slow, async () => {
+  const { at, speed, cells } = told.leaps;
+  const states = floats("leaps.state");
+  const got = await still.page.evaluate(async ([at, patternSpeed, config]) => {
+    const { stage } = viewer;
+    const { warmup, steps_per_frame: steps, seed } = config;
+    Object.assign(stage.settings, { warmup, steps, seed, patternSpeed });
+    await viewer.use("standing", 0);
+    stage.layers[0].reset();
+    const result = [];
+    for (const place of at) {
+      await viewer.goTo(place);
+      const [layer] = stage.layers;
+      const state = new Float32Array(await stage.gpu.read(layer.state));
+      result.push(...state.subarray(0, 12 * layer.sites.cells));
+    }
+    Object.assign(stage.settings, viewer.defaults);
+    return result;
+  }, [at, speed, told.config]);
+  assert.equal(got.length, 12 * cells.reduce((sum, each) => sum + each));
+  const worst = states.reduce((most, value, k) => Math.max(most, Math.abs(value - got[k])), 0);
+  assert.ok(worst < 1e-5, `states are ${worst} apart`);
+});
+
+test("back and forth a carried pattern comes to where it was", slow, async () => {
+  const found = await still.page.evaluate(async () => {
+    const { stage } = viewer;
+    await viewer.use("carried", 0);
+    const [layer] = stage.layers;
+    const taught = stage.patternSpeed(layer);
+    const seen = async () => {
+      const state = new Float32Array(await stage.gpu.read(layer.state));
+      return Array.from({ length: layer.sites.cells }, (_, row) => state[12 * row]);
+    };
+    // How far the first channel is from what it was once it has been a frame ahead, without a step.
+    const changed = async (ahead, back) => {
+      stage.settings.warmup = 32;
+      layer.reset();
+      await viewer.goTo(2);
+      const before = await seen();
+      layer.step = () => undefined;
+      stage.settings.patternSpeed = ahead;
+      await viewer.goTo(3);
+      stage.settings.patternSpeed = back;
+      await viewer.goTo(2);
+      delete layer.step;
+      const after = await seen();
+      return before.reduce((sum, value, k) => sum + Math.abs(value - after[k]), 0) / before.length;
+    };
+    const result = { taught, both: await changed(1, 1), ahead: await changed(1, 0), none: await changed(0, 0) };
+    Object.assign(stage.settings, viewer.defaults);
+    return result;
+  });
+  assert.equal(found.taught, 1);
+  assert.ok(found.none < found.both && found.both < 0.7 * found.ahead, JSON.stringify(found));
+});
 
 test("it plays to the end", slow, async () => {
   const { page } = still;
@@ -277,7 +341,7 @@ test("keys, wheel and fingers move the camera and choose tools", slow, async () 
 
 test("a link restores what is seen", slow, async () => {
   const { page } = still;
-  const asked = { strength: 0.7, lightAzimuth: 30, mix: 0.25, detail: 1 };
+  const asked = { strength: 0.7, patternSpeed: 0.5, lightAzimuth: 30, mix: 0.25, detail: 1 };
   const address = await page.evaluate(async (asked) => {
     Object.assign(viewer.stage.settings, asked);
     await viewer.use("frost", 0);
