@@ -29,7 +29,7 @@ STYLES = ("ink", "church")
 FRAMES, RESOLUTION, SIZE = 4, 24, 96
 CARRIED, STANDING = "carried", "standing"
 """The first of them, taught and not taught that the velocity carries the state along."""
-SETTINGS = {"warmup": 8, "steps_per_frame": 4, "seed": 5}
+CONFIG = StylizeConfig(warmup=8, steps_per_frame=4, seed=5)
 REFINEMENTS = (1, 2)
 LEAPS = (0, 2, 3)
 """Frames that are shown, by their place in the sequence, where one is skipped."""
@@ -50,17 +50,18 @@ def main(out: Path) -> None:
     for name in (CARRIED, STANDING):
         models[name] = _taught(models[STYLES[0]], transport=name == CARRIED)
     _added(site, {name: models[name] for name in (CARRIED, STANDING)})
-    told = {"size": SIZE, "styles": {}, "config": SETTINGS}
+    told = {"size": SIZE, "styles": {}, "config": {}}
+    for name in ("warmup", "steps_per_frame", "seed"):
+        told["config"][name] = getattr(CONFIG, name)
     volumes = [*file.volumes()]
-    config = StylizeConfig(**SETTINGS)
     for style, model in models.items():
         told["styles"][style] = {}
         for refine in REFINEMENTS:
-            paintings = [*stylize(volumes, model.rule, config, box=volumes[0].box, refine=refine)]
+            paintings = [*stylize(volumes, model.rule, CONFIG, box=volumes[0].box, refine=refine)]
             told["styles"][style][refine] = _written(out / f"{style}_{refine}", paintings)
             pictures = [_pictures(each, refine, model.rule.scales) for each in paintings]
             np.concatenate(pictures).tofile(out / f"{style}_{refine}.pictures")
-    leaps = replace(config, pattern_speed=LEAPS_SPEED)
+    leaps = replace(CONFIG, pattern_speed=LEAPS_SPEED)
     shown = [volumes[at] for at in LEAPS]
     paintings = [*stylize(shown, models[STANDING].rule, leaps, box=volumes[0].box)]
     told["leaps"] = {"at": LEAPS, "speed": LEAPS_SPEED, **_written(out / "leaps", paintings)}
