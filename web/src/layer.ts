@@ -11,7 +11,7 @@ import { type Gpu, run } from "./gpu";
 import { maskKey, maskThreshold, packedDecoder, packedWeights, quarters, stencil } from "./automaton";
 import { affineInverse, product } from "./matrix";
 import type { Rule } from "./model";
-import { findSites, formerRows, RIM, type Sites } from "./sites";
+import { findSites, RIM, type Sites } from "./sites";
 import type { Frame, Smoke } from "./smoke";
 
 const SLOT = 256; // bytes between uniforms of steps
@@ -53,6 +53,7 @@ export class Layer {
   private readonly weights: GPUBuffer;
   private readonly network: GPUBuffer;
   private readonly given: GPUBuffer;
+  private readonly wanted: GPUBuffer;
   private readonly now: GPUBuffer[];
 
   private constructor(
@@ -70,6 +71,7 @@ export class Layer {
     this.weights = gpu.buffer(packedWeights(rule, toldWidth, isHalf), "the rule");
     this.network = gpu.buffer(packedDecoder(rule), "the decoder");
     this.given = gpu.uniform(112);
+    this.wanted = gpu.uniform(48);
     // Of painting, and of each layer of the rim of up to four parts a cell.
     this.now = Array.from({ length: 2 + 4 * RIM }, () => gpu.uniform(32));
   }
@@ -85,7 +87,7 @@ export class Layer {
     const [step, condition, carry, paint, rim] = await Promise.all([
       gpu.compute(`${factor}${planes}${sizes}${sitesCode}${stepCode}`, "step"),
       gpu.compute(`${sitesCode}${smokeCode}${conditionCode}`, "condition"),
-      gpu.compute(`${planes}${carryCode}`, "carry"),
+      gpu.compute(`${planes}${sitesCode}${smokeCode}${carryCode}`, "carry"),
       gpu.compute(painting, "paint"),
       gpu.compute(painting, "rim"),
     ]);
@@ -105,19 +107,22 @@ export class Layer {
     return true;
   }
 
-  /** Take up a frame: cells that were active before keep their state. */
-  enter(buffers: FrameBuffers, guide: Guide): void {
+  /** Take up a frame: its velocity carries the state to its cells, for so many frames. */
+  enter(buffers: FrameBuffers, guide: Guide, frames: number): void {
     const { gpu, rule } = this;
     const sites = findSites(this.smoke, buffers.frame, rule.density, rule.dilation, rule.wholeBox);
     const places = gpu.buffer(sites.places, "the list of cells");
     const size = (sites.cells + 1) * 16 * quarters(rule.channels);
     const state = gpu.buffer(size, "the state");
     if (this.sites !== null && this.state !== null && sites.cells > 0) {
-      const former = gpu.buffer(formerRows(sites, this.sites), "the list of cells");
+      this.writeWanted(sites, guide, frames);
       const { carry } = this.pipelines;
-      const group = gpu.bound(carry, 0, { 0: former, 1: this.state, 2: state });
-      gpu.submit((encoder) => run(encoder, carry, [group], Math.ceil(sites.cells / 64)));
-      former.destroy();
+      const groups = [
+        gpu.bound(carry, 0, { 0: this.uniform, 1: this.places! }),
+        gpu.bound(carry, 1, { 0: this.wanted, 1: places, 2: this.state, 3: state }),
+        gpu.bound(carry, 2, { 0: buffers.uniform, 1: buffers.bytes }),
+      ];
+      gpu.submit((encoder) => run(encoder, carry, groups, Math.ceil(sites.cells / 64)));
     }
     this.release();
     gpu.write(this.uniform, sites.uniform);
@@ -127,6 +132,15 @@ export class Layer {
     this.spare = gpu.buffer(size, "the state");
     this.told = gpu.buffer(sites.cells * 16 * quarters(rule.width + 1), "the conditioning");
     this.condition(buffers, guide);
+  }
+
+  private writeWanted(sites: Sites, guide: Guide, frames: number): void {
+    const [, , , , , , , , , , , bricks, x, y, z] = sites.uniform;
+    const wanted = new ArrayBuffer(48);
+    new Uint32Array(wanted).set([x * y * z, bricks, sites.cells]);
+    const floats = new Float32Array(wanted);
+    floats.set([frames, ...this.alongCells(guide.direction), guide.amount, this.rule.speed], 3);
+    this.gpu.write(this.wanted, floats);
   }
 
   /** What cells are told of a frame. */
@@ -299,6 +313,6 @@ export class Layer {
   destroy(): void {
     this.release();
     const own = [this.uniform, this.steps, this.filters, this.weights, this.network, this.given];
-    for (const buffer of [...own, ...this.now]) buffer.destroy();
+    for (const buffer of [...own, this.wanted, ...this.now]) buffer.destroy();
   }
 }

@@ -11,6 +11,7 @@ const RANGES: Partial<Record<keyof Settings, [number, number]>> = {
   densityStrength: [0, 1],
   steps: [0, 256],
   warmup: [0, 4096],
+  patternSpeed: [-1, 8],
   density: [0.001, 1000],
   light: [0, 20],
   ambient: [0, 1],

@@ -3,7 +3,7 @@
 import { Problem, require } from "./problem";
 
 /** The newest format that is read, as `rule/model.py` writes it. */
-const FORMAT = 3;
+const FORMAT = 4;
 const MOST_BYTES = 64 * 2 ** 20;
 const MOST = { channels: 64, hidden: 1024, units: 256, dilation: 64, steps: 4096 };
 const WIDTHS: Record<string, number> = { position: 3, density: 1, velocity: 3 };
@@ -26,6 +26,8 @@ export interface Rule {
   readonly decoder: { weights: Matrix; bias: Matrix }[];
   readonly probability: number;
   readonly steps: number;
+  /** Whether the velocity carries the state along between frames. */
+  readonly transport: boolean;
   readonly dilation: number;
   readonly wholeBox: boolean;
   readonly sobel: number;
@@ -82,6 +84,8 @@ function parsed(bytes: ArrayBuffer, name: string): Rule {
     if (shape[`${key as string}_prior`] !== false) columns[key as string] = width;
     width += wide as number;
   }
+  const transport: unknown = shape.transport ?? false;
+  check(typeof transport === "boolean", "damaged model (transport is not true or false)");
   const hidden = sized(tensor("hidden"), units, 5 * channels + width, `${name}: hidden`);
   const bias = sized(tensor("bias"), units, 1, `${name}: bias`);
   const output = sized(tensor("output"), channels, units, `${name}: output`);
@@ -97,6 +101,7 @@ function parsed(bytes: ArrayBuffer, name: string): Rule {
     decoder: decoder(header, tensor, channels, name),
     probability: number(shape.update_probability, 1e-9, 1, "update_probability"),
     steps: number(shape.steps_per_frame, 1, MOST.steps, "steps_per_frame"),
+    transport: transport as boolean,
     dilation: number(shape.dilation ?? shape.reach ?? 1, 0, MOST.dilation, "dilation"),
     wholeBox: shape.domain === "box",
     sobel: number(shape.sobel_divisor, 1e-9, 1e9, "sobel_divisor"),

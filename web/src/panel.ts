@@ -24,6 +24,7 @@ const GROUPS: [string, Slider[]][] = [
       { name: "densityStrength", label: "Density change", low: 0, high: 1, step: 0.01, hint: "How much the style thins and thickens the smoke" },
       { name: "density", label: "Opacity", low: 0.02, high: 20, step: 0.01, log: true, unit: "×", hint: "Extinction γ, as a multiple of the style's own" },
       { name: "steps", label: "Steps a frame", low: 0, high: 64, step: 1, hint: "How long the rule works between two frames; 0 is as in its training" },
+      { name: "patternSpeed", label: "Pattern speed", low: 0, high: 2, step: 0.05, unit: "×", hint: "How fast the smoke carries the pattern from frame to frame: 0 stands, 1 goes along, 2 runs ahead" },
       { name: "detail", label: "Detail", low: 1, high: 3, step: 1, unit: "×", hint: "Parts of a cell that are drawn, as by --refine" },
       { name: "half", label: "16-bit steps", low: 0, high: 1, step: 1, hint: "Quicker, and a little rounder" },
       { name: "seed", label: "Seed", low: 0, high: 99, step: 1, hint: "Another seed, another painting of the same style" },
@@ -93,7 +94,7 @@ function makeSlider(viewer: Viewer, slider: Slider, updates: (() => void)[]): HT
   };
   const row = element("label", { class: "slider", title: hint, ondblclick: reset }, element("span", {}, label), value, input);
   updates.push(() => {
-    const now = viewer.stage.settings[name];
+    const now = valueOf(viewer, name);
     const shown = log ? Math.log(now) : now;
     if (Number(input.value) !== shown) input.value = String(shown);
     const from = Number(input.min);
@@ -105,7 +106,15 @@ function makeSlider(viewer: Viewer, slider: Slider, updates: (() => void)[]): HT
   return row;
 }
 
+/** What a setting comes to: one that is left to the rule is as the first one has it. */
+function valueOf(viewer: Viewer, name: keyof Settings): number {
+  const [first] = viewer.stage.layers;
+  if (name === "patternSpeed" && first !== undefined) return viewer.stage.patternSpeed(first);
+  return viewer.stage.settings[name];
+}
+
 function text(viewer: Viewer, name: keyof Settings, value: number, unit: string): string {
   if (name === "steps" && value === 0) return `${viewer.stage.layers[0]?.rule.steps ?? ""} as trained`;
-  return `${Number(value.toPrecision(3))}${unit}`;
+  const kept = viewer.stage.settings[name] < 0 && name === "patternSpeed" ? " as trained" : "";
+  return `${Number(value.toPrecision(3))}${unit}${kept}`;
 }

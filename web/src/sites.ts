@@ -166,27 +166,3 @@ function inBrick(
   }
   return active.length + beside.length > before;
 }
-
-/** The row that each active cell had among other sites, or NOWHERE. */
-export function formerRows(sites: Sites, before: Sites): Uint32Array<ArrayBuffer> {
-  const [, , , , , , , , bx, by, bz, count, sx, sy, sz] = sites.uniform;
-  const [, , , , , , , , fx, fy, fz, former, gx, gy, gz] = before.uniform;
-  const own = sx * sy * sz;
-  const theirs = gx * gy * gz;
-  const rows = theirs + 3 * former;
-  const result = new Uint32Array(sites.cells).fill(NOWHERE);
-  void [bx, by, bz];
-  for (let row = 0; row < sites.cells; row++) {
-    const at = sites.places[own + 515 * count + row];
-    const brick = own + 3 * (at >>> 9);
-    const x = (sites.places[brick] | 0) - fx;
-    const y = (sites.places[brick + 1] | 0) - fy;
-    const z = (sites.places[brick + 2] | 0) - fz;
-    if (x < 0 || y < 0 || z < 0 || x >= gx || y >= gy || z >= gz) continue;
-    const there = before.places[(x * gy + y) * gz + z];
-    if (there === NOWHERE) continue;
-    const found = before.places[rows + 512 * there + (at & 511)];
-    if (found < before.cells) result[row] = found;
-  }
-  return result;
-}

@@ -19,6 +19,8 @@ export interface Settings {
   /** Steps a frame; those of the rule's training where it is 0. */
   steps: number;
   warmup: number;
+  /** How fast the velocity carries patterns; as in a rule's training where it is below 0. */
+  patternSpeed: number;
   strength: number;
   densityStrength: number;
   /** What γ of the rule is multiplied by. */
@@ -46,6 +48,7 @@ export const DEFAULTS: Readonly<Settings> = {
   seed: 0,
   steps: 0,
   warmup: 64,
+  patternSpeed: -1,
   strength: 1,
   densityStrength: 1,
   density: 1,
@@ -63,6 +66,8 @@ export const DEFAULTS: Readonly<Settings> = {
   brush: 5,
   half: 0,
 };
+/** Frames up to which the velocity of one carries states over those that are skipped. */
+const NEAR = 4;
 const FIELD_OF_VIEW = 30;
 const STRIDE = 0.5; // cells of what is drawn, between samples along a ray
 /** Points along each axis of a part, by how many parts a cell has: `rule/paint.py`. */
@@ -149,7 +154,7 @@ export class Stage {
   }
 
   private begin(layer: Layer): void {
-    layer.enter(this.buffers!, this.guide);
+    layer.enter(this.buffers!, this.guide, 0);
     this.frameSteps(layer, this.settings.warmup);
   }
 
@@ -164,16 +169,30 @@ export class Stage {
   }
 
   enterFrame(frame: Frame, at: number): void {
+    const passed = this.passed(frame, at);
     this.release();
     this.buffers = this.upload(frame);
     this.at = at;
     for (const layer of this.layers) {
       const isNew = layer.sites === null || layer.sites.cells === 0;
-      layer.enter(this.buffers, this.guide);
+      layer.enter(this.buffers, this.guide, passed * this.patternSpeed(layer));
       this.frameSteps(layer, isNew ? this.settings.warmup : 0);
     }
     this.stale.state = true;
     if (at + 1 < this.smoke.length) void this.smoke.frame(at + 1).catch(() => undefined);
+  }
+
+  /** How many frames lie between the last one and another; none where it is far from there. */
+  private passed(frame: Frame, at: number): number {
+    if (this.buffers === null) return 0;
+    const passed = frame.number - this.buffers.frame.number;
+    return at === this.at + 1 || Math.abs(passed) <= NEAR ? passed : 0;
+  }
+
+  /** How fast the velocity carries the pattern of a rule. */
+  patternSpeed({ rule }: Layer): number {
+    const { patternSpeed } = this.settings;
+    return patternSpeed < 0 ? Number(rule.transport) : patternSpeed;
   }
 
   /** From nothing, at the first frame. */

@@ -7,7 +7,8 @@ import json
 import struct
 import sys
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +20,20 @@ from vnca.recipe.film import FilmConfig, Shown, behind, picture
 from vnca.recipe.sequence import region_bounds
 from vnca.recipe.simulation import simulate
 from vnca.recipe.viewing import ViewRun, run
-from vnca.rule.model import load_style
+from vnca.rule.model import Model, load_style
 from vnca.viewer import SMOKE_NAME
 from vnca.viewer.smoke_file import MAGIC, SmokeFile
 
 STYLES = ("ink", "church")
 """With γ and density scales that are not each other's."""
 FRAMES, RESOLUTION, SIZE = 4, 24, 96
+CARRIED, STANDING = "carried", "standing"
+"""The first of them, taught and not taught that the velocity carries the state along."""
 CONFIG = StylizeConfig(warmup=8, steps_per_frame=4, seed=5)
 REFINEMENTS = (1, 2)
+LEAPS = (0, 2, 3)
+"""Frames that are shown, by their place in the sequence, where one is skipped."""
+LEAPS_SPEED = 1.5
 
 
 def main(out: Path) -> None:
@@ -40,27 +46,49 @@ def main(out: Path) -> None:
     asked = ViewRun(model=STYLES[0], sequence=str(smoke), frames=frames, export=site)
     run(asked, SILENT, lambda _: None)
     file = SmokeFile(site / SMOKE_NAME)
-    told = {"size": SIZE, "styles": {}, "config": vars(CONFIG)}
-    for style in STYLES:
+    models = {style: load_style(style) for style in STYLES}
+    for name in (CARRIED, STANDING):
+        models[name] = _taught(models[STYLES[0]], transport=name == CARRIED)
+    _added(site, {name: models[name] for name in (CARRIED, STANDING)})
+    told = {"size": SIZE, "styles": {}, "config": {}}
+    for name in ("warmup", "steps_per_frame", "seed"):
+        told["config"][name] = getattr(CONFIG, name)
+    volumes = [*file.volumes()]
+    for style, model in models.items():
         told["styles"][style] = {}
         for refine in REFINEMENTS:
-            name = f"{style}_{refine}"
-            told["styles"][style][refine] = _painted(out, file, style, refine, name)
+            paintings = [*stylize(volumes, model.rule, CONFIG, box=volumes[0].box, refine=refine)]
+            told["styles"][style][refine] = _written(out / f"{style}_{refine}", paintings)
+            pictures = [_pictures(each, refine, model.rule.scales) for each in paintings]
+            np.concatenate(pictures).tofile(out / f"{style}_{refine}.pictures")
+    leaps = replace(CONFIG, pattern_speed=LEAPS_SPEED)
+    shown = [volumes[at] for at in LEAPS]
+    paintings = [*stylize(shown, models[STANDING].rule, leaps, box=volumes[0].box)]
+    told["leaps"] = {"at": LEAPS, "speed": LEAPS_SPEED, **_written(out / "leaps", paintings)}
     (out / "reference.json").write_text(json.dumps(told))
     _hostile(site, out / "hostile")
 
 
-def _painted(out: Path, file: SmokeFile, style: str, refine: int, name: str) -> dict[str, object]:
-    rule = load_style(style).rule
-    volumes = [*file.volumes()]
-    box = volumes[0].box
-    paintings = [*stylize(volumes, rule, CONFIG, box=box, refine=refine)]
+def _taught(model: Model, *, transport: bool) -> Model:
+    config = replace(model.rule.config, transport=transport)
+    return replace(model, rule=replace(model.rule, config=config))
+
+
+def _added(site: Path, models: dict[str, Model]) -> None:
+    """Have a site show more rules, after its own."""
+    show = json.loads((site / "show.json").read_text())
+    for name, model in models.items():
+        model.save(site / "rules" / f"{name}.safetensors")
+        show["rules"].append({"name": name, "title": name, "model": f"rules/{name}.safetensors"})
+    (site / "show.json").write_text(json.dumps(show))
+
+
+def _written(path: Path, paintings: Sequence[Painting]) -> dict[str, object]:
+    """States to a file; and how many cells there are in each, and channels."""
     states = [painting.state for painting in paintings]
-    np.concatenate([s.values[:-1].reshape(-1) for s in states]).tofile(out / f"{name}.state")
-    np.concatenate([_pictures(p, refine, rule.scales) for p in paintings]).tofile(
-        out / f"{name}.pictures"
-    )
-    return {"cells": [len(state.cells) for state in states], "channels": rule.config.channels}
+    values = [state.values[:-1] for state in states]
+    np.concatenate([each.reshape(-1) for each in values]).tofile(path.with_suffix(".state"))
+    return {"cells": [len(state.cells) for state in states], "channels": values[0].shape[1]}
 
 
 def _pictures(painting: Painting, refine: int, scales: object) -> np.ndarray:

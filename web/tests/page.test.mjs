@@ -39,16 +39,15 @@ const pixels = (page, size = 64) =>
   page.evaluate(async (size) => [...(await viewer.stage.pixels(size, size))], size);
 
 const told = JSON.parse(readFileSync(join(MATERIAL, "reference.json")));
-for (const [style, refine] of [["ink", 1], ["church", 1], ["ink", 2]]) {
+const same = [["ink", 1], ["church", 1], ["ink", 2], ["carried", 1]];
+for (const [style, refine] of same) {
   test(`${style} at detail ${refine} steps and looks as vnca's own painting`, slow, async () => {
     const got = await still.page.evaluate(paintAll, [style, refine, told.config, told.size]);
     const { cells, channels } = told.styles[style][refine];
     assert.deepEqual(got.cells, cells);
     const states = floats(`${style}_${refine}.state`);
-    assert.equal(got.states.length, states.length);
     assert.equal(channels, 12);
-    const worst = states.reduce((most, value, at) => Math.max(most, Math.abs(value - got.states[at])), 0);
-    assert.ok(worst < 1e-5, `states are ${worst} apart`);
+    assertSame(got.states, states);
     assert.ok(Math.max(...states) > 0.1);
     const pictures = floats(`${style}_${refine}.pictures`);
     const count = told.size ** 2;
@@ -78,6 +77,8 @@ for (const [style, refine] of [["ink", 1], ["church", 1], ["ink", 2]]) {
 async function paintAll([style, refine, config, size]) {
   const { stage } = viewer;
   const { warmup, steps_per_frame: steps, seed } = config;
+  viewer.adapt = () => undefined; // or it looks at fewer points where pictures come late
+  stage.samples = 0;
   Object.assign(stage.settings, { warmup, steps, seed, detail: refine });
   await viewer.use(style, 0);
   stage.camera = stage.framed(1);
@@ -95,9 +96,84 @@ async function paintAll([style, refine, config, size]) {
     result.shown.push([...(await stage.pixels(size, size))]);
   }
   Object.assign(stage.settings, viewer.defaults);
+  delete viewer.adapt;
   viewer.reframe();
   return result;
 }
+
+/** In the page: the states of all that paint, at frames one after the other. */
+async function statesAt([first, second, at, { warmup, steps_per_frame: steps, seed }, patternSpeed]) {
+  const { stage } = viewer;
+  Object.assign(stage.settings, { warmup, steps, seed, patternSpeed });
+  await viewer.use(first, 0);
+  await viewer.use(second, 1);
+  for (const layer of stage.layers) layer.reset();
+  const result = stage.layers.map(() => []);
+  for (const place of at) {
+    await viewer.goTo(place);
+    for (const [number, layer] of stage.layers.entries()) {
+      const state = new Float32Array(await stage.gpu.read(layer.state));
+      result[number].push(...state.subarray(0, 12 * layer.sites.cells));
+    }
+  }
+  await viewer.use("", 1);
+  Object.assign(stage.settings, viewer.defaults);
+  return result;
+}
+
+function assertSame(states, expected) {
+  assert.equal(states.length, expected.length);
+  const worst = expected.reduce((most, value, at) => Math.max(most, Math.abs(value - states[at])), 0);
+  assert.ok(worst < 1e-5, `states are ${worst} apart`);
+}
+
+test("the velocity carries each rule of a mix as it was taught", slow, async () => {
+  const asked = ["carried", "standing", [0, 1, 2, 3], told.config, -1];
+  const [carried, standing] = await still.page.evaluate(statesAt, asked);
+  assertSame(carried, floats("carried_1.state"));
+  assertSame(standing, floats("standing_1.state"));
+  const first = 12 * told.styles.carried[1].cells[0];
+  assert.ok(apart(carried.slice(first), standing.slice(first)) > 1e-3);
+});
+
+test("it carries over frames that are skipped, as fast as is asked for", slow, async () => {
+  const { at, speed } = told.leaps;
+  const [states] = await still.page.evaluate(statesAt, ["standing", "", at, told.config, speed]);
+  assertSame(states, floats("leaps.state"));
+});
+
+test("back and forth a carried pattern comes to where it was", slow, async () => {
+  const found = await still.page.evaluate(async () => {
+    const { stage } = viewer;
+    await viewer.use("carried", 0);
+    const [layer] = stage.layers;
+    const taught = stage.patternSpeed(layer);
+    const seen = async () => {
+      const state = new Float32Array(await stage.gpu.read(layer.state));
+      return Array.from({ length: layer.sites.cells }, (_, row) => state[12 * row]);
+    };
+    // How far the first channel is from what it was once it has been a frame ahead, without a step.
+    const changed = async (ahead, back) => {
+      stage.settings.warmup = 32;
+      layer.reset();
+      await viewer.goTo(2);
+      const before = await seen();
+      layer.step = () => undefined;
+      stage.settings.patternSpeed = ahead;
+      await viewer.goTo(3);
+      stage.settings.patternSpeed = back;
+      await viewer.goTo(2);
+      delete layer.step;
+      const after = await seen();
+      return before.reduce((sum, value, k) => sum + Math.abs(value - after[k]), 0) / before.length;
+    };
+    const result = { taught, both: await changed(1, 1), ahead: await changed(1, 0), none: await changed(0, 0) };
+    Object.assign(stage.settings, viewer.defaults);
+    return result;
+  });
+  assert.equal(found.taught, 1);
+  assert.ok(found.none < found.both && found.both < 0.9 * found.ahead, JSON.stringify(found));
+});
 
 test("it plays to the end", slow, async () => {
   const { page } = still;
@@ -277,7 +353,7 @@ test("keys, wheel and fingers move the camera and choose tools", slow, async () 
 
 test("a link restores what is seen", slow, async () => {
   const { page } = still;
-  const asked = { strength: 0.7, lightAzimuth: 30, mix: 0.25, detail: 1 };
+  const asked = { strength: 0.7, patternSpeed: 0.5, lightAzimuth: 30, mix: 0.25, detail: 1 };
   const address = await page.evaluate(async (asked) => {
     Object.assign(viewer.stage.settings, asked);
     await viewer.use("frost", 0);

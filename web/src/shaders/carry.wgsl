@@ -1,22 +1,99 @@
-// The state on the cells of another frame: cells active in both keep theirs, new ones start at zero.
+// The state on the cells of another frame, carried there by its velocity: `painting/transport.py`.
+//
+// `sites` are those that it comes from. Places are counted from the cell, which keeps their digits.
 
-@group(0) @binding(0) var<storage, read> former: array<u32>;  // The row each had, or 0xffffffff.
-@group(0) @binding(1) var<storage, read> before: array<vec4f>;
-@group(0) @binding(2) var<storage, read_write> after: array<vec4f>;
+struct Wanted {
+  map: u32,       // Of the cells that want a state: how many places their map has,
+  bricks: u32,    // how many bricks hold them,
+  cells: u32,     // and how many there are.
+  frames: f32,    // For how long the velocity carries it; below zero back, 0 not at all.
+  guide: vec4f,   // As the rule is told.
+  speed: f32,     // That counts as 1.
+}
+
+@group(1) @binding(0) var<uniform> wanted: Wanted;
+@group(1) @binding(1) var<storage, read> wanted_places: array<u32>;
+@group(1) @binding(2) var<storage, read> before: array<vec4f>;
+@group(1) @binding(3) var<storage, read_write> after: array<vec4f>;
+
+// What must be active upstream of a cell for it to have its state from there.
+const LEAST_SHARE = 0.25;
+// What must be known of the velocity.
+const LEAST_KNOWN = 1e-6;
+const FARTHEST = 1048576.0;
+
+fn wanted_cell(row: u32) -> vec3i {
+  let at = wanted_places[wanted.map + 515u * wanted.bricks + row];
+  let brick = wanted.map + 3u * (at >> 9);
+  let corner = vec3u(wanted_places[brick], wanted_places[brick + 1u], wanted_places[brick + 2u]);
+  return vec3i(corner) * 8 + vec3i(vec3u((at >> 6) & 7u, (at >> 3) & 7u, at & 7u));
+}
+
+fn side_of(corner: u32) -> vec3i {
+  return vec3i(vec3u(corner >> 2, (corner >> 1) & 1u, corner & 1u));
+}
+
+fn share_of(side: vec3i, upper: vec3f) -> f32 {
+  let parts = select(1.0 - upper, upper, side == vec3i(1));
+  return parts.x * parts.y * parts.z;
+}
+
+// By how much what is at a cell has come to it: a midpoint step back.
+fn moved(cell: vec3i) -> vec3f {
+  let here = wanted.frames * guided(velocity_at(cell), wanted.guide, wanted.speed);
+  let last = smoke.upper - 1;
+  let halfway = clamp(-0.5 * here, vec3f(smoke.lower - cell), vec3f(last - cell));
+  let below = min(cell + vec3i(floor(halfway)), max(last - 1, smoke.lower));
+  let upper = halfway - vec3f(below - cell);
+  let beside = select(vec3i(0), vec3i(1), last > smoke.lower);
+  var total = vec3f(0.0);
+  var known = 0.0;
+  for (var corner = 0u; corner < 8u; corner++) {
+    let side = side_of(corner);
+    let velocity = velocity_at(below + side * beside);
+    if (any(velocity != vec3f(0.0))) {
+      let share = share_of(side, upper);
+      total += share * guided(velocity, wanted.guide, wanted.speed);
+      known += share;
+    }
+  }
+  if (known > LEAST_KNOWN) {
+    return wanted.frames * (total / known);
+  }
+  return here;
+}
 
 @compute @workgroup_size(64)
 fn carry(
   @builtin(global_invocation_id) thread: vec3u, @builtin(num_workgroups) groups: vec3u
 ) {
   let row = thread.y * groups.x * 64u + thread.x;
-  if (row >= arrayLength(&former)) {
+  if (row >= wanted.cells) {
     return;
   }
-  let had = former[row];
+  let cell = wanted_cell(row);
+  let upstream = clamp(-moved(cell), vec3f(-FARTHEST), vec3f(FARTHEST));
+  let first = floor(upstream);
+  var rows: array<u32, 8>;
+  var shares: array<f32, 8>;
+  var total = 0.0;
+  for (var corner = 0u; corner < 8u; corner++) {
+    let side = side_of(corner);
+    rows[corner] = row_of(bordered(cell + vec3i(first) + side));
+    shares[corner] = select(0.0, share_of(side, upstream - first), rows[corner] < sites.cells);
+    total += shares[corner];
+  }
+  if (total < LEAST_SHARE) {
+    rows[0] = row_of(cell);
+    shares = array<f32, 8>(select(0.0, 1.0, rows[0] < sites.cells), 0, 0, 0, 0, 0, 0, 0);
+    total = 1.0;
+  }
   for (var p = 0u; p < PLANES; p++) {
     var value = vec4f(0.0);
-    if (had != 0xffffffffu) {
-      value = before[had * PLANES + p];
+    for (var corner = 0u; corner < 8u; corner++) {
+      if (shares[corner] > 0.0) {
+        value += (shares[corner] / total) * before[rows[corner] * PLANES + p];
+      }
     }
     after[row * PLANES + p] = value;
   }

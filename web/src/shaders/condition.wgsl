@@ -40,7 +40,7 @@ fn condition(
   }
   if (given.columns.z >= 0) {
     let own = velocity_at(cell) / given.scales.y;
-    let turned = mix(own, given.guide.xyz * max(length(own), 0.5), given.guide.w);
+    let turned = guided(own, given.guide, 1.0);
     let limited = turned * (SPEED_LIMIT / max(length(turned), SPEED_LIMIT));
     for (var axis = 0u; axis < 3u; axis++) {
       told[first + u32(given.columns.z) + axis] = limited[axis];

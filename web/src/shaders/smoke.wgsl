@@ -55,3 +55,8 @@ fn velocity_at(cell: vec3i) -> vec3f {
   }
   return smoke.speed * parts * abs(parts);
 }
+
+// A velocity turned towards a direction by a part; one that rests, as if it had half of `unit`.
+fn guided(velocity: vec3f, guide: vec4f, unit: f32) -> vec3f {
+  return mix(velocity, guide.xyz * max(length(velocity), 0.5 * unit), guide.w);
+}
