@@ -13,7 +13,8 @@ and then, gone on with as a pattern that the smoke carries,
 
 The first was made before rules were carried (`--no-transport --steadiness 0 --motion.weight 0.3`
 does that now). The café went on for 120 iterations at a steadiness of 2 and for 120 at 1, as 300 at
-0.5 left it pale; the threads for another 100 with `--overflow 400`. States live for 640 steps: as long as films are.
+0.5 left it pale; the threads for another 100 with `--overflow 400`. States live for 640 steps: as
+long as films are.
 What a model tells of the smoke that it was trained on is left out: the library paints
 other smoke.
 """
