@@ -305,8 +305,11 @@ void backward(const Step& s, const float* packed, const Block& block, const floa
 
 double multiply_adds(std::int64_t rounds) {
     constexpr int CHAINS = REGISTERS == 32 ? 24 : 12;  // more than wait for one another
-    Vec sum[CHAINS] = {};
-    const Units half = (Units)(Vec{} + 0.5f);
+    // No two alike, and none known to the compiler, which would compute equal ones once.
+    volatile float start = 0.5f;
+    Vec sum[CHAINS];
+    for (int i = 0; i < CHAINS; ++i) sum[i] = Vec{} + (start + float(i));
+    const Units half = (Units)(Vec{} + start);
     for (std::int64_t round = 0; round < rounds; ++round)
 #pragma GCC unroll 24
         for (int i = 0; i < CHAINS; ++i) sum[i] = chained(sum[i], half);
