@@ -71,6 +71,8 @@ def test_a_command_of_the_documentation_is_understood(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text('base = "draft"\n')  # a preset that a page tells to make
     shutil.copy(EXAMPLES / "shot.toml", tmp_path)
+    (tmp_path / "examples").mkdir()
+    shutil.copy(EXAMPLES / "shot.toml", tmp_path / "examples")
     try:
         code = main(words)
     except Read:
