@@ -196,6 +196,23 @@ def cells_per_frame(
     return np.eye(3)
 
 
+def carried_to(cells: AnyArray, velocity: Field, known: Field, frames: Any) -> FloatArray:
+    """By how much what is at cells `[n, 3]` has come to them, `[n, 3]`: a midpoint step back.
+
+    Where no velocity is known halfway, that at the cell counts.
+
+    Args:
+        cells: Index coordinates.
+        velocity: `[..., 3]`, cells per frame.
+        known: Where it is stored, in the same box.
+        frames: The time, one or of each cell `[n, 1]`; below zero it goes back.
+    """
+    moved = frames * velocity.gather(cells)
+    halfway, found = interpolated(velocity, known, cells - 0.5 * moved)
+    moved[found] = (frames * halfway)[found]
+    return moved
+
+
 def likely_velocity_scale(first: Volume, second: Volume) -> float:
     """By what power of two the first frame's velocity seems to be off; 1 unless it is clear.
 
@@ -213,8 +230,11 @@ def likely_velocity_scale(first: Volume, second: Volume) -> float:
     velocity, before, after = (
         replace(each, box=box) for each in (velocity, first.density_field, second.density_field)
     )
-    listed = [cells_at(each.bricks, each.values > 0) for each in (before, after)]
-    cells = np.unique(np.concatenate(listed), axis=0)
+    smoke, smoke_after = (
+        replace(each, values=each.values > 0, outside=False) for each in (before, after)
+    )
+    smoke = smoke.union(smoke_after)
+    cells = cells_at(smoke.bricks, smoke.values)
     here, there = before.gather(cells), after.gather(cells)
     unit = max(here.max(initial=0), there.max(initial=0))
     cells = cells[np.abs(there - here) > _FIT_CHANGE * unit]
@@ -227,10 +247,8 @@ def likely_velocity_scale(first: Volume, second: Volume) -> float:
     stored = replace(before, values=np.ones(before.values.shape, bool), outside=False)
 
     def mismatch(scale: float) -> float:
-        moved = scale * velocity.gather(cells)
-        halfway, found = interpolated(velocity, moving, cells - 0.5 * moved)
-        moved[found] = scale * halfway[found]
-        fetched = interpolated(density, stored, cells - moved)[0][:, 0]
+        upstream = cells - carried_to(cells, velocity, moving, scale)
+        fetched = interpolated(density, stored, upstream)[0][:, 0]
         return float(np.abs(fetched - there).mean() / np.abs(here - there).mean())
 
     found = {2.0**power: mismatch(2.0**power) for power in range(-7, 8)}

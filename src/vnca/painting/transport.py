@@ -15,7 +15,7 @@ from vnca.core import FloatArray
 from vnca.core.field import Field
 from vnca.direction.mixing import Answer
 from vnca.engine.domain import Domain
-from vnca.io.velocity import interpolated
+from vnca.io.velocity import carried_to
 
 CHUNK = 1 << 15
 """Cells that are carried at a time: what that takes fits into a cache."""
@@ -48,9 +48,7 @@ def transported(
     def carry(start: int) -> None:
         some = slice(start, start + CHUNK)
         cells = after.cells[some]
-        moved = time[some] * velocity.gather(cells)
-        halfway, found = interpolated(velocity, known, cells - 0.5 * moved)
-        moved[found] = time[some][found] * halfway[found]
+        moved = carried_to(cells, velocity, known, time[some])
         rows, shares = before.sources(replace(after, cells=cells), moved)
         for row, share in zip(rows, shares, strict=True):
             carried[:-1][some] += share[:, None] * state[row]
