@@ -117,7 +117,7 @@ def test_another_file_ends_the_work(scene: bpy.types.Scene, plume: bpy.types.Obj
 def test_a_worker_does_not_outlive_blender(scene: bpy.types.Scene, plume: bpy.types.Object) -> None:
     scene.vnca.refine = 8
     job = begin(scene)
-    time.sleep(1)
+    until(job, "painting")
     job._process.stdin.close()  # as the system does when Blender crashes
     assert job._process.wait(timeout=10) != 0
 
