@@ -163,14 +163,4 @@ _CLASSES = (
     VNCA_OT_use_active,
 )
 
-
-def register() -> None:
-    """Add the operators."""
-    for kind in _CLASSES:
-        bpy.utils.register_class(kind)
-
-
-def unregister() -> None:
-    """Take them away."""
-    for kind in reversed(_CLASSES):
-        bpy.utils.unregister_class(kind)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

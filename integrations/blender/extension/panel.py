@@ -200,14 +200,4 @@ def _draw_job(layout: bpy.types.UILayout, job: Job, letters: int) -> None:
 
 _CLASSES = (VNCA_PT_view, VNCA_PT_volume, VNCA_PT_domain)
 
-
-def register() -> None:
-    """Add the panels."""
-    for kind in _CLASSES:
-        bpy.utils.register_class(kind)
-
-
-def unregister() -> None:
-    """Take them away."""
-    for kind in reversed(_CLASSES):
-        bpy.utils.unregister_class(kind)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -89,14 +89,4 @@ def train_job(scene: bpy.types.Scene, *, goes_on: bool = False) -> dict[str, obj
 
 _CLASSES = (VNCA_OT_train, VNCA_OT_check_training)
 
-
-def register() -> None:
-    """Add the operators."""
-    for kind in _CLASSES:
-        bpy.utils.register_class(kind)
-
-
-def unregister() -> None:
-    """Take them away."""
-    for kind in reversed(_CLASSES):
-        bpy.utils.unregister_class(kind)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)
