@@ -17,7 +17,7 @@ from vnca.engine.automaton import OFFSETS, HashArray, hash_cells
 MOST_CELLS = 2**27
 """A larger box (512³) may not be active as a whole."""
 
-_LEAST_SHARE = 0.25
+LEAST_SHARE = 0.25
 """What must be alive upstream of a cell for it to have its state from there."""
 
 _WIDE = EDGE + 2
@@ -154,16 +154,10 @@ class Domain:
             Rows `[8, m]` of the state around each point, z fastest, n for the outside; and
             `[m, 3]` how far it lies from the first of these cells to the last, 0 to 1.
         """
-        lower, upper = np.asarray(self.box.lower), np.asarray(self.box.upper)
         first = np.floor(points)
         fractions = np.ascontiguousarray(points - first, np.float32)
-        cells = first + np.array(list(product((0, 1), repeat=3)))[:, None]
-        if self.border == "replicate":
-            cells = cells.clip(lower, upper - 1)
-        else:
-            cells = (cells - lower) % (upper - lower) + lower
-        rows = self.rows.gather(cells.astype(np.int32).reshape(-1, 3))
-        return rows.reshape(8, -1), fractions
+        rows = self._rows_at(first + np.array(list(product((0, 1), repeat=3)))[:, None])
+        return rows, fractions
 
     @cached_property
     def places(self) -> AnyArray:
@@ -196,30 +190,73 @@ class Domain:
     def sources(self, other: "Domain", moved: AnyArray) -> tuple[IntArray, FloatArray]:
         """Where the cells of `other` have their state from, once it has been moved: upstream.
 
-        A state there is interpolated linearly between the cells that are alive; their shares are
-        scaled to add up to one. A cell that would have little or nothing from them keeps its own.
+        A state there is interpolated cubically, along z, then y, then x; a cell that is not alive
+        counts as the next that is. A cell that would have little or nothing keeps its own.
 
         Args:
             other: The cells that want a state.
             moved: `[m, 3]`, by how much it has come to each of them, cells.
 
         Returns:
-            Rows `[8, m]` of the state here, n for the outside, and their shares `[8, m]`.
+            Rows `[64, m]` of the state here, n for the outside, and their shares `[64, m]`.
 
-        Reference: Stam 1999, section 2.3 (semi-Lagrangian advection).
+        Reference: Stam 1999, section 2.3 (semi-Lagrangian advection); Catmull & Rom 1974.
         """
-        rows, upper = self.corners(other.cells - moved)
-        shares = np.ones(rows.shape, np.float32)
-        for corner, share in zip(product((0, 1), repeat=3), shares, strict=True):
-            for axis, side in enumerate(corner):
-                share *= upper[:, axis] if side else 1 - upper[:, axis]
-        shares *= rows < len(self)
-        total = shares.sum(axis=0)
-        from_outside = total < _LEAST_SHARE
-        shares /= np.where(from_outside, 1, total)
-        shares[:, from_outside] = np.eye(8, 1, dtype=np.float32)
+        points = other.cells - moved
+        first = np.floor(points)
+        rows = self._rows_at(first + np.array(list(product(range(-1, 3), repeat=3)))[:, None])
+        rows = rows.reshape(4, 4, 4, -1)
+        alive = rows < len(self)
+        x, y, z = np.ascontiguousarray((points - first).T, np.float32)
+        inner = zip(
+            product((1 - x, x), (1 - y, y), (1 - z, z)), product((1, 2), repeat=3), strict=True
+        )
+        total = sum(alive[at] * a * b * c for (a, b, c), at in inner)
+        shares, lines = _cubic(z, alive)
+        along_y, planes = _cubic(y, lines)
+        along_x, _ = _cubic(x, planes)
+        shares *= along_y[:, :, None]
+        shares *= along_x[:, None, None]
+        rows, shares = rows.reshape(64, -1), shares.reshape(64, -1)
+        from_outside = total < LEAST_SHARE
+        shares[:, from_outside] = np.eye(64, 1, dtype=np.float32)
         rows[0, from_outside] = self.rows.gather(other.cells[from_outside])
         return rows, shares
+
+    def _rows_at(self, cells: AnyArray) -> IntArray:
+        """Rows `[k, m]` of the cells at whole index coordinates `[k, m, 3]`, inside or beyond."""
+        lower, upper = np.asarray(self.box.lower), np.asarray(self.box.upper)
+        if self.border == "replicate":
+            cells = cells.clip(lower, upper - 1)
+        else:
+            cells = (cells - lower) % (upper - lower) + lower
+        return self.rows.gather(cells.astype(np.int32).reshape(-1, 3)).reshape(len(cells), -1)
+
+
+def _cubic(t: FloatArray, alive: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Shares of four cells along an axis for places between the two in the middle.
+
+    Args:
+        t: `[m]` how far from the second to the third.
+        alive: `[..., 4, m]`; a cell that is not counts as the next that is.
+
+    Returns:
+        `[..., 4, m]`, and whether one of the two in the middle is alive, `[..., m]`.
+    """
+    first, second, third, fourth = np.moveaxis(alive, -2, 0)
+    shares = np.empty((4, *first.shape), np.float32)
+    shares[0] = ((2 - t) * t - 1) * t / 2
+    shares[1] = ((3 * t - 5) * t * t + 2) / 2
+    shares[2] = ((4 - 3 * t) * t + 1) * t / 2
+    shares[3] = (t - 1) * t * t / 2
+    for outer, inner, there in ((0, 1, first & second), (3, 2, third & fourth)):
+        shares[inner] += np.where(there, 0, shares[outer])
+        shares[outer] *= there
+    shares[1], shares[2] = (
+        second * (shares[1] + ~third * shares[2]),
+        third * (shares[2] + ~second * shares[1]),
+    )
+    return np.moveaxis(shares, 0, -2), second | third
 
 
 def subdivided(cells: IntArray, neighbours: IntArray, factor: int) -> tuple[IntArray, FloatArray]:

@@ -14,11 +14,12 @@ import numpy as np
 from vnca.core import FloatArray
 from vnca.core.field import Field
 from vnca.direction.mixing import Answer
+from vnca.engine.carrying import carried
 from vnca.engine.domain import Domain
 from vnca.io.velocity import carried_to
 
 CHUNK = 1 << 15
-"""Cells that are carried at a time: what that takes fits into a cache."""
+"""Cells that are traced back at a time: what that takes fits into a cache."""
 
 
 def transported(
@@ -42,17 +43,12 @@ def transported(
     """
     known = replace(velocity, values=velocity.values.any(axis=-1), outside=False)
     time = np.broadcast_to(np.float32(frames), len(after))[:, None]
-    carried = np.zeros((len(after) + 1, state.shape[1]), state.dtype)
-    _ = before.rows  # found once, not by each thread
+    moved = np.empty((len(after), 3), np.float32)
 
-    def carry(start: int) -> None:
+    def trace(start: int) -> None:
         some = slice(start, start + CHUNK)
-        cells = after.cells[some]
-        moved = carried_to(cells, velocity, known, time[some])
-        rows, shares = before.sources(replace(after, cells=cells), moved)
-        for row, share in zip(rows, shares, strict=True):
-            carried[:-1][some] += share[:, None] * state[row]
+        moved[some] = carried_to(after.cells[some], velocity, known, time[some])
 
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        list(pool.map(carry, range(0, len(after), CHUNK)))
-    return carried
+        list(pool.map(trace, range(0, len(after), CHUNK)))
+    return carried(state, before, after, moved, threads=threads)

@@ -12,6 +12,20 @@ def fill(
     threads: int,
     /,
 ) -> None: ...
+def carry(
+    state: FloatArray,
+    bricks: IntArray,
+    rows: IntArray,
+    lower: tuple[int, int, int],
+    upper: tuple[int, int, int],
+    circular: bool,
+    least: float,
+    cells: IntArray,
+    moved: FloatArray,
+    out: FloatArray,
+    threads: int,
+    /,
+) -> None: ...
 def changing_rows(hashes: IntArray, key: int, threshold: int, rows: IntArray, /) -> int: ...
 def forward(
     state: FloatArray,

@@ -10,6 +10,7 @@ from torch import Tensor
 from vnca.core import FloatArray
 from vnca.engine import torch_decode
 from vnca.engine.automaton import DecoderWeights
+from vnca.engine.carrying import carried
 from vnca.engine.domain import Domain
 from vnca.rendering.colour import srgb_to_linear
 from vnca.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, Decoder
@@ -116,12 +117,15 @@ class Scene(ABC, Generic[Viewpoint]):
 
     @torch.no_grad()
     def _carried(self, state: Tensor, moved: FloatArray) -> Tensor:
-        sources = self.domain.sources(self.domain, moved)
-        rows, shares = (torch.from_numpy(part).to(state.device) for part in sources)
-        carried = torch.zeros_like(state)
-        for row, share in zip(rows, shares, strict=True):
-            carried[:-1] += share[:, None] * state[row]
-        return carried
+        moved = np.ascontiguousarray(np.broadcast_to(moved, (len(self.domain), 3)), np.float32)
+        if state.device.type == "cpu":
+            values = carried(state.detach().numpy(), self.domain, self.domain, moved)
+            return torch.from_numpy(values)
+        rows, shares = map(torch.from_numpy, self.domain.sources(self.domain, moved))
+        result = torch.zeros_like(state)
+        for row, share in zip(rows.to(state.device), shares.to(state.device), strict=True):
+            result[:-1] += share[:, None] * state[row]
+        return result
 
     @abstractmethod
     def viewpoint(self, random: np.random.Generator) -> Viewpoint:

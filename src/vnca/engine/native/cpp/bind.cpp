@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "bind_carry.hpp"
 #include "bind_decode.hpp"
 #include "fill.hpp"
 #include "mask.hpp"
@@ -125,6 +126,7 @@ const Kernel& kernel_named(const std::string& name, bool bfloat16) {
 
 NB_MODULE(_native, m) {
     m.doc() = "The native kernels; see the native.py of each operation.";
+    bind_carry(m);
     bind_decode(m);
 
     m.def("instructions", [](bool bfloat16) {
