@@ -5,7 +5,6 @@ In tiny numbers: nothing is learned that would be worth looking at.
 """
 
 import os
-import time
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
