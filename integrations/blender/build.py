@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds the extension: a zip for each platform and Python of Blender, and their index.
 
-`python build.py --blender PYTHON --out DIR [--platform NAME …]`. Wheels of vnca are built here,
-with the native kernel for this platform and without it for others; pip fetches what vnca needs.
-Blender's own program packs, checks and lists the zips: PYTHON has the package `bpy`.
+`python build.py --blender PYTHON --wheels DIR --out DIR [--platform NAME …]`. A zip has the wheel
+of vnca that `tools/wheels.py` or cibuildwheel made for its platform and Python; where there is
+none, one without the native kernel, which paints in numpy. pip fetches what vnca needs. Blender's
+own program packs, checks and lists the zips: PYTHON has the package `bpy`.
 """
 
 import argparse
-import platform
 import re
 import shutil
 import subprocess
@@ -46,7 +46,7 @@ def main() -> None:
     parser.add_argument("--blender", required=True, help="a Python that has bpy")
     parser.add_argument("--out", type=Path, required=True, help="folder for zips and index")
     parser.add_argument("--platform", nargs="*", choices=PLATFORMS, default=list(PLATFORMS))
-    parser.add_argument("--wheels", type=Path, help="folder of wheels that cibuildwheel made")
+    parser.add_argument("--wheels", type=Path, required=True, help="folder of wheels of vnca")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     for old in options.out.glob("*.zip"):
@@ -54,14 +54,10 @@ def main() -> None:
     program = extension_program(options.blender)
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
-        anywhere = build_wheel(sys.executable, folder / "any", native=False)
+        anywhere = wheel_without_kernel(folder / "any")
         for python, blenders in BLENDERS.items():
-            here = None
-            if not options.wheels and this_platform() in options.platform:
-                here = native_wheel(python, folder / f"native{python}")
             for name in options.platform:
-                made = made_wheel(options.wheels, name, python)
-                wheel = made or (here if here and name == this_platform() else anywhere)
+                wheel = made_wheel(options.wheels, name, python) or anywhere
                 source = folder / f"{name}-{python}"
                 fill(source, wheel, name, python, blenders)
                 path = options.out / f"vnca-{version()}-{name}-py{python.replace('.', '')}.zip"
@@ -123,61 +119,25 @@ def locked(package: str) -> str:
     return "".join(match[0] for match in found)
 
 
-def made_wheel(folder: Path | None, name: str, python: str) -> Path | None:
-    """The wheel of vnca for a platform and Python among those that were made before."""
-    if folder is None:
-        return None
-    tag = f"cp{python.replace('.', '')}"
-    system, _, machine = name.partition("-")
-    ends = {"linux": "manylinux*", "windows": "win*", "macos": "macosx*"}[system]
-    machine = {"x64": "*64", "arm64": "*arm64"}[machine]
-    found = sorted(folder.glob(f"vnca-{version()}-{tag}-{tag}-{ends}{machine}.whl"))
-    return next(
-        (path for path in found if path.stem.endswith("arm64") == (machine == "*arm64")), None
-    )
+def made_wheel(folder: Path, name: str, python: str) -> Path | None:
+    """The wheel of vnca for a platform and Python among those that were made before.
+
+    From Python 3.12 on it is that of the stable ABI.
+    """
+    minor = int(python.partition(".")[2])
+    tags = "cp312-abi3" if minor >= 12 else f"cp3{minor}-cp3{minor}"
+    where = re.sub(r"_\d+_\d+_", "*", PLATFORMS[name][0])  # whatever version of the system
+    return next(iter(sorted(folder.glob(f"vnca-{version()}-{tags}-{where}.whl"))), None)
 
 
-def native_wheel(python: str, folder: Path) -> Path | None:
-    """A wheel with the kernel for this platform; None where this Python cannot be had here."""
-    program = sys.executable
-    if version_of(program) != python:
-        words = (
-            Path(sys.executable).with_name("uv"),
-            "python",
-            "find",
-            "--no-python-downloads",
-            "--no-project",
-            python,
-        )
-        program = subprocess.run(words, capture_output=True, text=True).stdout.strip()
-        if version_of(program) != python:
-            print(f"Python {python}: not here; its zips paint in numpy", flush=True)
-            return None
-    wheel = build_wheel(program, folder, native=True)
-    return None if wheel.name.endswith("-none-any.whl") else wheel
-
-
-def build_wheel(program: str, folder: Path, *, native: bool) -> Path:
-    """A wheel of vnca, with the kernel for this platform and Python, or without one for any."""
-    folder.mkdir(parents=True)
-    words = ["-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", folder, ROOT]
-    if program == sys.executable:
-        words.append("--no-build-isolation")
-    if not native:
-        for setting in ("wheel.py-api=py3", "wheel.cmake=false"):
-            words += ["--config-settings", setting]
-    run(program, *words)
+def wheel_without_kernel(folder: Path) -> Path:
+    """A wheel of vnca for any platform."""
+    words = ["-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"]
+    for setting in ("wheel.py-api=py3", "wheel.cmake=false"):
+        words += ["--config-settings", setting]
+    run(sys.executable, *words, "--wheel-dir", folder, ROOT)
     (wheel,) = folder.glob("vnca-*.whl")
     return wheel
-
-
-def version_of(program: str) -> str:
-    """Major and minor version of a Python; empty if it does not run."""
-    if not program:
-        return ""
-    code = "import sys; print('%d.%d' % sys.version_info[:2])"
-    done = subprocess.run([program, "-c", code], capture_output=True, text=True)
-    return done.stdout.strip()
 
 
 def version() -> str:
@@ -185,13 +145,6 @@ def version() -> str:
     found = re.search(r'(?m)^version = "(.*)"', (ROOT / "pyproject.toml").read_text("utf-8"))
     assert found is not None, "pyproject.toml has a version"
     return found[1]
-
-
-def this_platform() -> str:
-    """The name that Blender has for this machine."""
-    system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}[platform.system()]
-    machine = {"x86_64": "x64", "AMD64": "x64", "arm64": "arm64", "aarch64": "arm64"}
-    return f"{system}-{machine[platform.machine()]}"
 
 
 def extension_program(blender: str) -> Path:

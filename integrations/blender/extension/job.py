@@ -2,6 +2,7 @@
 """A worker: how far it has come, how it is ended, and what it left when it died."""
 
 import json
+import math
 import os
 import subprocess
 import time
@@ -10,8 +11,8 @@ from typing import IO, Any
 
 from .interpreter import Interpreter
 
-PATIENCE = 0.6
-"""Seconds that a worker has to end by itself."""
+PATIENCE = 3.0
+"""Seconds that a cancelled worker has to write down what it has; nobody waits for that."""
 _LOG_LINES = 12
 
 
@@ -52,7 +53,7 @@ class Job:
         folder.mkdir(parents=True, exist_ok=True)
         self.log = folder / "log.txt"
         (folder / "job.json").write_text(json.dumps(asked), encoding="utf-8")
-        self._rest, self._ended_at = b"", None
+        self._rest, self._deadline = b"", math.inf
         with self.log.open("wb") as log:
             self._process = subprocess.Popen(
                 [*interpreter.words, str(folder / "job.json")],
@@ -86,42 +87,36 @@ class Job:
         return self.state, self.what, self.done, self.total, left, self.pictures, len(self.notes)
 
     def poll(self) -> bool:
-        """Read what it said since, without waiting; whether it is at work still."""
-        if not self.is_running:
+        """Read what it said since, without waiting; whether its process is there still."""
+        if self._said.closed:
             return False
         code = self._process.poll()
         self._read()
         if code is None:
-            if self._ended_at is not None and time.monotonic() - self._ended_at > PATIENCE:
+            if time.monotonic() > self._deadline:
                 self._process.kill()
             return True
         self._said.close()
-        if self._process.stdin is not None and not self._process.stdin.closed:
-            self._process.stdin.close()
-        if self._ended_at is not None:
-            self.state, self.message = "cancelled", "cancelled"
-        elif code == 0 and self.result:
-            self.state = "done"
-        else:
-            self.state = "failed"
+        self._process.stdin.close()
+        if self.is_running:
+            self.state = "done" if code == 0 and self.result else "failed"
+        if self.state == "failed":
             self.message = self.message or _died(code)
         return False
 
     def cancel(self) -> None:
-        """Ask it to end; in less than a second `poll` says that it has."""
-        if self.is_running and self._ended_at is None:
-            self._ended_at = time.monotonic()
-            self.what = "cancelling"
-            assert self._process.stdin is not None
+        """It is cancelled from now on; its process ends by itself, or `poll` ends it later."""
+        if self.is_running:
+            self.state = "cancelled"
+            self._deadline = time.monotonic() + PATIENCE
             self._process.stdin.close()  # the worker waits for that
 
     def end(self) -> None:
-        """End it at once, and wait for that."""
+        """Cancel it if it is running, and end its process at once."""
         self.cancel()
-        if self.is_running:
-            self._process.kill()
-            self._process.wait()
-            self.poll()
+        self._process.kill()
+        self._process.wait()
+        self.poll()
 
     def last_lines(self) -> list[str]:
         """The end of what it said."""
@@ -140,7 +135,7 @@ class Job:
 
     def _hear(self, told: dict[str, Any]) -> None:
         kind = told.get("event")
-        if kind == "progress" and self._ended_at is None:
+        if kind == "progress":
             self.what, self.done, self.total = told["what"], told["done"], told["total"]
             self.seconds_left = told.get("seconds_left")
         elif kind == "note":

@@ -110,7 +110,7 @@ class VncaSettings(bpy.types.PropertyGroup):
         update=_shown_at_once,
     )
     density_strength: FloatProperty(
-        name="Density Strength",
+        name="Density",
         description="How much the painting changes the density; painted",
         default=1.0,
         min=0.0,
@@ -167,7 +167,7 @@ class VncaSettings(bpy.types.PropertyGroup):
         options=_PATH,
     )
     hide_source: BoolProperty(
-        name="In Place of the Smoke",
+        name="Hide the Smoke",
         description="Hide the smoke that was painted",
         default=True,
     )
@@ -197,18 +197,16 @@ def python_for_training(context: bpy.types.Context) -> str:
     return bpy.path.abspath(addon.preferences.python) if addon and addon.preferences else ""
 
 
-_CLASSES = (VncaSettings, VncaPreferences)
+_register, _unregister = bpy.utils.register_classes_factory((VncaSettings, VncaPreferences))
 
 
 def register() -> None:
     """Add the settings to scenes."""
-    for kind in _CLASSES:
-        bpy.utils.register_class(kind)
+    _register()
     bpy.types.Scene.vnca = PointerProperty(type=VncaSettings)
 
 
 def unregister() -> None:
     """Take them away."""
     del bpy.types.Scene.vnca
-    for kind in reversed(_CLASSES):
-        bpy.utils.unregister_class(kind)
+    _unregister()

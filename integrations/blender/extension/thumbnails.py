@@ -20,11 +20,6 @@ def style_items(_: object, __: object) -> list[tuple[str, str, str, int, int]]:
     return _items
 
 
-def icon_of_style(name: str) -> int:
-    """Number of the picture of a style; 0 if there is none."""
-    return next((item[3] for item in _items if item[0] == name), 0)
-
-
 def icon_of_work(path: str | None) -> int:
     """Number of the latest picture of the work; 0 if there is none.
 

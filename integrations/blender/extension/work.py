@@ -61,7 +61,6 @@ class Working(bpy.types.Operator):
         if not self._begin(context):
             return {"CANCELLED"}
         manager = context.window_manager
-        manager.progress_begin(0, 1)
         self._timer = manager.event_timer_add(TICK, window=context.window)
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -72,17 +71,17 @@ class Working(bpy.types.Operator):
         if job is None or _running is not self:
             self._tidy(context)
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
+        if event.type == "ESC" and event.value == "PRESS" and job.is_running:
             job.cancel()
+            _redraw(context)
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        is_at_work = job.poll()
-        context.window_manager.progress_update(job.fraction)
-        if (seen := job.seen) != self._seen:
+        is_there = job.poll()
+        if (seen := job.seen) != self._seen or not is_there:
             self._seen = seen
             _redraw(context)
-        if is_at_work:
+        if is_there:
             return {"PASS_THROUGH"}
         self._tidy(context)
         return self._end()
@@ -107,6 +106,8 @@ class Working(bpy.types.Operator):
     def _begin(self, context: bpy.types.Context) -> bool:
         global current, _running
         self._scene = context.scene.name
+        if current is not None:
+            current.end()  # one that was cancelled may be writing still
         try:
             current = self.start(context)
         except (ProblemError, OSError) as error:
@@ -133,7 +134,6 @@ class Working(bpy.types.Operator):
         return {"FINISHED"}
 
     def _tidy(self, context: bpy.types.Context) -> None:
-        context.window_manager.progress_end()
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None

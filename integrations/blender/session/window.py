@@ -6,8 +6,8 @@ as a keyboard does, and `import` of ImageMagick. The extension is installed; or 
 folder of its sources, registered by hand where Blender knows no extensions yet. With PICTURE a
 style is trained, too.
 
-FOLDER gets screenshots, and `window.json`: how long it took from pressing Esc, and from when the
-window heard of it, to the end of the work, and for how long the window was busy at most meanwhile.
+FOLDER gets screenshots, and `window.json`: seconds from pressing Esc until the window is free again
+and until the worker's process is gone, and for how long the window was busy at most meanwhile.
 """
 
 import importlib
@@ -112,19 +112,21 @@ def esc(name: str, work: Any) -> Iterator[float]:
     """Press Esc, and wait for the end."""
     job, _busy[1] = work.current, 0.0
     what = f"{job.what} {job.done}/{job.total}"
-    subprocess.Popen(["xdotool", "mousemove", "400", "400", "key", "Escape"])
+    assert _keyboard.stdin is not None
+    _keyboard.stdin.write("mousemove 400 400 key Escape\n")
     start = time.monotonic()
-    heard = 0.0
     while job.is_running and time.monotonic() - start < 30:
-        heard = heard or (time.monotonic() if job.what == "cancelling" else 0.0)
+        yield TICK
+    free = time.monotonic()
+    while job.poll() and time.monotonic() - start < 30:
         yield TICK
     told["cancelled"].append(
         {
             "work": name,
             "at": what,
             "state": job.state,
-            "seconds": round(time.monotonic() - start, 2),
-            "seconds_since_heard": round(time.monotonic() - (heard or start), 2),
+            "seconds": round(free - start, 2),
+            "seconds_until_gone": round(time.monotonic() - start, 2),
             "longest_busy": round(_busy[1], 2),
         }
     )
@@ -150,6 +152,8 @@ def tick() -> "float | None":
 
 
 _steps = steps()
+# One that is there already, so that starting it is not measured.
+_keyboard = subprocess.Popen(["xdotool", "-"], stdin=subprocess.PIPE, text=True, bufsize=1)
 Path(FOLDER).mkdir(parents=True, exist_ok=True)
 bpy.context.preferences.view.show_splash = False
 if INSTALLED not in bpy.context.preferences.addons and REST:

@@ -36,6 +36,19 @@ def begin(scene: bpy.types.Scene) -> Any:
     return work.current
 
 
+def ends_within_a_second(job: Any) -> None:
+    """For the artist; the process has a little longer to write down what it has."""
+    start = time.monotonic()
+    assert bpy.ops.vnca.cancel() == {"FINISHED"}
+    assert job.state == "cancelled"
+    assert not bpy.ops.vnca.cancel.poll()
+    assert time.monotonic() - start < 1
+    while job.poll():
+        assert time.monotonic() - start < import_module(f"{NAME}.job").PATIENCE + 5
+        time.sleep(0.02)
+    assert job.state == "cancelled"
+
+
 def until(job: Any, what: str, seconds: float = 60, *, least: int = 0) -> None:
     start = time.monotonic()
     while job.poll() and not (job.what == what and job.done >= least):
@@ -53,12 +66,7 @@ def test_cancelling_takes_less_than_a_second_at_any_moment(
         time.sleep(0.3)
     elif moment != "at once":
         until(job, "painting", least=int(moment == "after a frame"))
-    assert bpy.ops.vnca.cancel() == {"FINISHED"}
-    start = time.monotonic()
-    while job.poll():
-        time.sleep(0.02)
-    assert time.monotonic() - start < 1
-    assert job.state == "cancelled"
+    ends_within_a_second(job)
     with pytest.raises(ProcessLookupError):
         os.kill(job.pid, 0)
     # And one can begin anew.

@@ -29,7 +29,6 @@ COMMANDS = {
 }
 HOMES = {name: f"{name}:run" for name in COMMANDS} | {
     "styles": "info:run_styles",
-    "simulate": "demo:run_simulate",
     "stylize": "paint:run_stylize",
     "render": "paint:run_render",
     "ablate": "evaluate:run_ablate",

@@ -1,14 +1,10 @@
-"""`vnca simulate`, and `vnca demo`: from nothing to a film of painted smoke."""
+"""`vnca demo`: from nothing to a film of painted smoke."""
 
-import dataclasses
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Annotated, Literal
-
-import tyro
 
 from vnca.cli.options import parse
 from vnca.cli.terminal import Terminal, say
@@ -19,37 +15,12 @@ from vnca.recipe import Watch
 from vnca.recipe.film import FilmConfig
 from vnca.recipe.rendering import RenderRun, strip
 from vnca.recipe.sequence import open_sequence
-from vnca.recipe.simulation import Scene, SimulateRun, simulate
+from vnca.recipe.simulation import simulate
 from vnca.recipe.smoke import SmokeRun
 from vnca.recipe.smoke import run as train
 from vnca.recipe.stylizing import stylize
 from vnca.training.config import SmokeConfig
 from vnca.training.presets import DEFAULT, preset
-
-
-@dataclass(frozen=True, kw_only=True)
-class Simulate(SimulateRun):
-    """Write a smoke simulation: density and velocity (cells/frame), an OpenVDB file a frame."""
-
-    scene: Annotated[
-        tyro.conf.Positional[Scene],
-        tyro.conf.arg(metavar="{plume,jets,ring,jet,sphere,billowy,bunny}"),
-    ]
-    """A rising plume, two colliding jets, a rising vortex ring; the paper's jet, a plume against a
-    sphere, billowy smoke, or smoke around a mesh (bunny)."""
-    preset: Annotated[Literal["paper"] | None, tyro.conf.arg(metavar="paper")] = None
-    """The jet as the paper has it: 200 cells across, 300 high, 120 frames."""
-    out: Path
-    """Folder for the frames, named SCENE_0001.vdb and on."""
-
-
-def run_simulate(arguments: Sequence[str]) -> None:
-    """Read the options and simulate."""
-    options = parse("simulate", Simulate, arguments)
-    asked = {f.name: getattr(options, f.name) for f in dataclasses.fields(SimulateRun)}
-    for _ in simulate(**asked, watch=Terminal()):
-        pass
-
 
 STYLE = "rust.webp"
 """A picture in the package that no style of its library has learned."""

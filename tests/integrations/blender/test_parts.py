@@ -296,12 +296,23 @@ def test_a_job_that_fails_says_why(parts: Any, code: str, message: str, tmp_path
 
 @pytest.mark.parametrize("code", ["sys.stdin.read()", "time.sleep(600)"])
 def test_a_job_is_cancelled_whether_it_listens_or_not(
-    parts: Any, code: str, tmp_path: Path
+    parts: Any, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(parts.job, "PATIENCE", 0.2)
     job = work(parts, tmp_path, code)
     assert job.poll()
     job.cancel()
+    assert job.state == "cancelled"  # at once: whoever waits for it is free
     assert finished(job).state == "cancelled"
+
+
+def test_a_cancelled_job_that_is_writing_still_is_ended(parts: Any, tmp_path: Path) -> None:
+    job = work(parts, tmp_path, "time.sleep(600)")
+    job.cancel()
+    job.end()
+    assert not job.poll()
+    assert job.state == "cancelled"
+    job.end()  # again, as when Blender quits
 
 
 def test_an_environment_is_found_by_its_folder(

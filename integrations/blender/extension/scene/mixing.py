@@ -98,11 +98,4 @@ def _group() -> bpy.types.NodeTree:
     return tree
 
 
-def register() -> None:
-    """Add the operator."""
-    bpy.utils.register_class(VNCA_OT_mix)
-
-
-def unregister() -> None:
-    """Take it away."""
-    bpy.utils.unregister_class(VNCA_OT_mix)
+register, unregister = bpy.utils.register_classes_factory((VNCA_OT_mix,))
