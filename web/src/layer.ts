@@ -1,18 +1,15 @@
 // A rule at work: its state on the active cells of a frame, stepped, carried on and painted.
 
-import carryCode from "./shaders/carry.wgsl";
-import conditionCode from "./shaders/condition.wgsl";
-import paintCode from "./shaders/paint.wgsl";
-import smokeCode from "./shaders/smoke.wgsl";
-import decoderCode from "../../src/vnca/engine/wgsl/decoder.wgsl";
-import sitesCode from "../../src/vnca/engine/wgsl/sites.wgsl";
-import stepCode from "../../src/vnca/engine/wgsl/step.wgsl";
-import { type Gpu, run } from "./gpu";
+import type { FrameBuffers } from "./frame";
+import { type Bindings, type Gpu, run } from "./gpu";
 import { maskKey, maskThreshold, packedDecoder, packedWeights, quarters, stencil } from "./automaton";
 import { affineInverse, product } from "./matrix";
 import type { Rule } from "./model";
-import { findSites, RIM, type Sites } from "./sites";
-import type { Frame, Smoke } from "./smoke";
+import { require } from "./problem";
+import { PAINTED, Programs, STATE, WANTED_PLACES } from "./programs";
+import { Layout, Rows } from "./rows";
+import { findSites, PLACES, RIM, type Sites } from "./sites";
+import type { Smoke } from "./smoke";
 
 const SLOT = 256; // bytes between uniforms of steps
 const AT_ONCE = 64; // steps
@@ -23,31 +20,24 @@ export interface Guide {
   amount: number;
 }
 
-interface Pipelines {
-  step: GPUComputePipeline;
-  condition: GPUComputePipeline;
-  carry: GPUComputePipeline;
-  paint: GPUComputePipeline;
-  rim: GPUComputePipeline;
-}
-
-/** The smoke of a frame on the GPU, shared by layers and pictures. */
-export interface FrameBuffers {
-  readonly frame: Frame;
-  readonly uniform: GPUBuffer;
-  readonly bytes: GPUBuffer;
+/** What the rule of a layer works on in a frame, on the GPU. */
+interface Work {
+  readonly sites: Sites;
+  readonly places: Rows;
+  /** What the cells are told, in the parts in which their states are. */
+  readonly told: Rows;
+  /** Of each part the first row, and how many cells there are. */
+  readonly batches: GPUBuffer[];
+  state: Rows;
+  spare: Rows;
 }
 
 export class Layer {
-  sites: Sites | null = null;
   stepsDone = 0;
-  painted: GPUBuffer | null = null;
   readonly uniform: GPUBuffer;
-  places: GPUBuffer | null = null;
-  state: GPUBuffer | null = null;
-  private spare: GPUBuffer | null = null;
-  private told: GPUBuffer | null = null;
-  private paintedFor = 0;
+  private work: Work | null = null;
+  private painting: Rows | null = null;
+  private readonly programs: Programs;
   private readonly steps: GPUBuffer;
   private readonly filters: GPUBuffer;
   private readonly weights: GPUBuffer;
@@ -60,10 +50,10 @@ export class Layer {
     private readonly gpu: Gpu,
     public rule: Rule,
     private readonly smoke: Smoke,
-    private readonly pipelines: Pipelines,
     readonly isHalf: boolean,
   ) {
     const toldWidth = 4 * quarters(rule.width + 1);
+    this.programs = new Programs(rule, smoke, isHalf);
     this.uniform = gpu.uniform(64);
     this.steps = gpu.uniform(SLOT * AT_ONCE);
     this.filters = gpu.uniform(27 * 32);
@@ -77,21 +67,37 @@ export class Layer {
   }
 
   static async create(gpu: Gpu, rule: Rule, smoke: Smoke, half: boolean): Promise<Layer> {
-    const isHalf = half && gpu.hasHalf;
-    const planes = `const PLANES = ${quarters(rule.channels)}u;\n`;
-    const units = rule.decoder.length > 0 ? quarters(rule.decoder[0].weights.rows) : 0;
-    const told = quarters(rule.width + 1);
-    const factor = isHalf ? "enable f16;\nalias Factor = f16;\n" : "alias Factor = f32;\n";
-    const sizes = `const TOLD = ${told}u;\nconst HIDDEN = ${rule.hidden.rows}u;\n`;
-    const painting = `${planes}const UNITS4 = ${units}u;\n${sitesCode}${decoderCode}${paintCode}`;
-    const [step, condition, carry, paint, rim] = await Promise.all([
-      gpu.compute(`${factor}${planes}${sizes}${sitesCode}${stepCode}`, "step"),
-      gpu.compute(`${sitesCode}${smokeCode}${conditionCode}`, "condition"),
-      gpu.compute(`${planes}${sitesCode}${smokeCode}${carryCode}`, "carry"),
-      gpu.compute(painting, "paint"),
-      gpu.compute(painting, "rim"),
+    for (const { name, width } of rule.fields) {
+      const isThere = smoke.fields.some((each) => each.name === name && each.width === width);
+      require(isThere, `${rule.name}: the rule is conditioned on ${name}, which this sequence does not have`);
+    }
+    const layer = new Layer(gpu, rule, smoke, half && gpu.hasHalf);
+    const { programs } = layer;
+    const { WHOLE } = Layout;
+    await gpu.prepare([
+      [programs.step(WHOLE, WHOLE), "step"],
+      [programs.condition(WHOLE, WHOLE), "condition"],
+      [programs.carry(WHOLE, WHOLE, WHOLE, WHOLE), "carry"],
+      [programs.paint(WHOLE, WHOLE, WHOLE), "paint"],
+      [programs.paint(WHOLE, WHOLE, WHOLE), "rim"],
     ]);
-    return new Layer(gpu, rule, smoke, { step, condition, carry, paint, rim }, isHalf);
+    return layer;
+  }
+
+  get sites(): Sites | null {
+    return this.work?.sites ?? null;
+  }
+
+  get state(): Rows | null {
+    return this.work?.state ?? null;
+  }
+
+  get places(): Rows | null {
+    return this.work?.places ?? null;
+  }
+
+  get painted(): Rows | null {
+    return this.painting;
   }
 
   /** The same rule with other weights goes on from its state; false where it is of another shape. */
@@ -111,42 +117,78 @@ export class Layer {
   enter(buffers: FrameBuffers, guide: Guide, frames: number): void {
     const { gpu, rule } = this;
     const sites = findSites(this.smoke, buffers.frame, rule.density, rule.dilation, rule.wholeBox);
-    const places = gpu.buffer(sites.places, "the list of cells");
-    const size = (sites.cells + 1) * 16 * quarters(rule.channels);
-    const state = gpu.buffer(size, "the state");
-    if (this.sites !== null && this.state !== null && sites.cells > 0) {
-      this.writeWanted(sites, guide, frames);
-      const { carry } = this.pipelines;
-      const groups = [
-        gpu.bound(carry, 0, { 0: this.uniform, 1: this.places! }),
-        gpu.bound(carry, 1, { 0: this.wanted, 1: places, 2: this.state, 3: state }),
-        gpu.bound(carry, 2, { 0: buffers.uniform, 1: buffers.bytes }),
-      ];
-      gpu.submit((encoder) => run(encoder, carry, groups, Math.ceil(sites.cells / 64)));
-    }
+    const work = this.prepared(sites);
+    if (this.work !== null && sites.cells > 0) this.carry(buffers, this.work, work, guide, frames);
     this.release();
     gpu.write(this.uniform, sites.uniform);
-    this.sites = sites;
-    this.places = places;
-    this.state = state;
-    this.spare = gpu.buffer(size, "the state");
-    this.told = gpu.buffer(sites.cells * 16 * quarters(rule.width + 1), "the conditioning");
+    this.work = work;
     this.condition(buffers, guide);
   }
 
-  private writeWanted(sites: Sites, guide: Guide, frames: number): void {
-    const [, , , , , , , , , , , bricks, x, y, z] = sites.uniform;
+  /** Room for the cells of a frame, all of it zeros. */
+  private prepared(sites: Sites): Work {
+    const { gpu, rule } = this;
+    const [wide, toldWide] = [16 * quarters(rule.channels), 16 * quarters(rule.width + 1)];
+    const layout = Layout.of(gpu, sites.cells + 1, wide, toldWide);
+    const places = Rows.of(gpu, sites.places, "the list of cells");
+    // Beside them: weights, what the cells are told, and the states that follow.
+    gpu.requireBindings(places.layout.parts + layout.parts + 3, "the cells of the smoke");
+    const batches = Array.from({ length: Math.ceil(sites.cells / layout.each) }, (_, part) => {
+      const batch = gpu.uniform(16);
+      const first = part * layout.each;
+      gpu.write(batch, new Uint32Array([first, Math.min(layout.each, sites.cells - first)]));
+      return batch;
+    });
+    const told = Rows.empty(gpu, new Layout(sites.cells, toldWide, layout.each), "the conditioning");
+    const [state, spare] = [0, 1].map(() => Rows.empty(gpu, layout, "the state"));
+    return { sites, places, told, batches, state, spare };
+  }
+
+  private carry(buffers: FrameBuffers, from: Work, to: Work, guide: Guide, frames: number): void {
+    const { gpu } = this;
+    const [, , , , , , , , , , , bricks, x, y, z] = to.sites.uniform;
     const wanted = new ArrayBuffer(48);
-    new Uint32Array(wanted).set([x * y * z, bricks, sites.cells]);
+    new Uint32Array(wanted).set([x * y * z, bricks]);
     const floats = new Float32Array(wanted);
     floats.set([frames, ...this.alongCells(guide.direction), guide.amount, this.rule.speed], 3);
-    this.gpu.write(this.wanted, floats);
+    gpu.write(this.wanted, floats);
+    const layouts = [from.places, to.places, from.state, buffers.words].map(({ layout }) => layout);
+    gpu.requireBindings(layouts.reduce((sum, { parts }) => sum + parts, 1), "the cells of two frames");
+    const [places, wantedPlaces, before, words] = layouts;
+    const carry = gpu.compute(this.programs.carry(places, wantedPlaces, before, words), "carry");
+    const shared = {
+      0: this.wanted,
+      ...to.places.bindings(WANTED_PLACES.first),
+      ...from.state.bindings(STATE.first),
+    };
+    this.eachBatch(to, carry, from.places, (part) => [
+      { ...shared, 3: to.state.buffers[part] },
+      buffers.bindings(),
+    ]);
+  }
+
+  /** Run a shader on the cells of each batch; what more it binds in groups 1 and 2. */
+  private eachBatch(
+    { batches, state, sites }: Work,
+    ready: GPUComputePipeline,
+    places: Rows,
+    more: (part: number) => Bindings[],
+  ): void {
+    const { gpu } = this;
+    const cells = Math.min(state.layout.each, sites.cells);
+    gpu.submit((encoder) =>
+      batches.forEach((batch, part) => {
+        const own = { 0: this.uniform, 1: batch, ...places.bindings(PLACES.first) };
+        const groups = [own, ...more(part)].map((each, group) => gpu.bound(ready, group, each));
+        run(encoder, ready, groups, Math.ceil(cells / 64));
+      }),
+    );
   }
 
   /** What cells are told of a frame. */
   condition(buffers: FrameBuffers, guide: Guide): void {
-    const { gpu, rule, sites } = this;
-    if (sites === null || sites.cells === 0) return;
+    const { gpu, rule, work } = this;
+    if (work === null || work.sites.cells === 0) return;
     const given = new ArrayBuffer(112);
     const floats = new Float32Array(given);
     const place = this.placeMatrix();
@@ -156,13 +198,12 @@ export class Layer {
     floats.set([rule.density, rule.speed], 20);
     floats.set([...this.alongCells(guide.direction), guide.amount], 24);
     gpu.write(this.given, floats);
-    const { condition } = this.pipelines;
-    const groups = [
-      gpu.bound(condition, 0, { 0: this.uniform, 1: this.places! }),
-      gpu.bound(condition, 1, { 0: this.given, 1: this.told! }),
-      gpu.bound(condition, 2, { 0: buffers.uniform, 1: buffers.bytes }),
-    ];
-    gpu.submit((encoder) => run(encoder, condition, groups, Math.ceil(sites.cells / 64)));
+    const { places, told } = work;
+    const code = this.programs.condition(places.layout, buffers.words.layout);
+    this.eachBatch(work, gpu.compute(code, "condition"), places, (part) => [
+      { 0: this.given, 1: told.buffers[part] },
+      buffers.bindings(),
+    ]);
   }
 
   /** A direction of the world, along the axes of the cells. */
@@ -216,7 +257,7 @@ export class Layer {
 
   /** So many steps, numbered on. */
   step(count: number, seed: number): void {
-    const { gpu, rule, sites } = this;
+    const { gpu, rule, work } = this;
     for (let done = 0; done < count; ) {
       const some = Math.min(AT_ONCE, count - done);
       const numbers = new Uint32Array((SLOT / 4) * some);
@@ -226,60 +267,95 @@ export class Layer {
         numbers.set([key, maskThreshold(rule.probability), always, 0], (SLOT / 4) * k);
       }
       gpu.write(this.steps, numbers);
-      if (sites !== null && sites.cells > 0) this.submitSteps(some);
+      if (work !== null && work.sites.cells > 0) this.submitSteps(work, some);
       done += some;
     }
     this.stepsDone += count;
   }
 
-  private submitSteps(count: number): void {
-    const { gpu, sites } = this;
-    const { step } = this.pipelines;
+  private submitSteps(work: Work, count: number): void {
+    const { gpu } = this;
+    const { places, told, batches } = work;
+    const step = gpu.compute(this.programs.step(places.layout, work.state.layout), "step");
+    const cells = Math.min(work.state.layout.each, work.sites.cells);
+    const shared = {
+      0: this.uniform,
+      3: this.filters,
+      4: this.weights,
+      ...places.bindings(PLACES.first),
+    };
     gpu.submit((encoder) => {
       for (let k = 0; k < count; k++) {
-        const group = gpu.bound(step, 0, {
-          0: this.uniform,
-          1: this.places!,
-          2: { buffer: this.steps, offset: SLOT * k, size: 16 },
-          3: this.filters,
-          4: this.weights,
-          5: this.told!,
-          6: this.state!,
-          7: this.spare!,
+        batches.forEach((batch, part) => {
+          const group = gpu.bound(step, 0, {
+            ...shared,
+            1: batch,
+            2: { buffer: this.steps, offset: SLOT * k, size: 16 },
+            5: told.buffers[part],
+            6: work.spare.buffers[part],
+            ...work.state.bindings(STATE.first),
+          });
+          run(encoder, step, [group], Math.ceil(cells / 256));
         });
-        run(encoder, step, [group], Math.ceil(sites!.cells / 256));
-        [this.state, this.spare] = [this.spare, this.state];
+        [work.state, work.spare] = [work.spare, work.state];
       }
     });
   }
 
+  /** Make the states zero that a brush touches, which tells where it is. */
+  erase(buffers: FrameBuffers, brush: Bindings): void {
+    const { work } = this;
+    if (work === null || work.sites.cells === 0) return;
+    const code = this.programs.erase(work.places.layout, buffers.words.layout);
+    this.eachBatch(work, this.gpu.compute(code, "erase"), work.places, (part) => [
+      { ...brush, 3: work.state.buffers[part] },
+      buffers.bindings(false),
+    ]);
+  }
+
   /** How many cells have a colour: the active ones, and those beside them. */
-  get shown(): number {
-    return this.sites === null ? 0 : this.sites.cells + this.sites.beside;
+  private get shown(): number {
+    return this.work === null ? 0 : this.work.sites.cells + this.work.sites.beside;
+  }
+
+  private paintedLayout(parts: number): Layout {
+    return Layout.of(this.gpu, this.shown, 16 * parts ** 3);
+  }
+
+  /** How many arrays are bound to paint so many parts of a cell along each axis, and to draw them
+   * beside so many others. */
+  boundFor(parts: number, others: number): number {
+    if (this.work === null) return 0;
+    const { places, state } = this.work;
+    const most = Math.max(state.layout.parts + 1, others);
+    return places.layout.parts + this.paintedLayout(parts).parts + most;
   }
 
   /** Look at the state: `samples` points along each axis of each of the `parts` of a cell. */
   paint(parts: number, samples: number): void {
-    const { gpu, rule, sites } = this;
-    if (sites === null) return;
-    const total = (sites.cells + sites.beside) * parts ** 3;
-    if (this.painted === null || this.paintedFor !== total) {
-      this.painted?.destroy();
-      this.painted = gpu.buffer(16 * total, "the painting");
-      this.paintedFor = total;
+    const { gpu, rule, work } = this;
+    if (work === null) return;
+    const { sites, places, state } = work;
+    const layout = this.paintedLayout(parts);
+    if (this.painting?.layout.count !== layout.count || this.painting.layout.width !== layout.width) {
+      this.painting?.destroy();
+      this.painting = Rows.empty(gpu, layout, "the painting");
     }
-    if (total === 0) return;
-    const { paint, rim } = this.pipelines;
+    if (layout.count === 0) return;
+    gpu.requireBindings(this.boundFor(parts, 0), "the painting");
+    const code = this.programs.paint(places.layout, state.layout, layout);
+    const [paint, rim] = [gpu.compute(code, "paint"), gpu.compute(code, "rim")];
     const layers = [sites.cells, ...Array<number>(RIM * parts + 1).fill(sites.beside)];
     layers.forEach((cells, at) => {
       const now = new Int32Array([parts, samples, Math.max(at - 1, 0), cells, rule.dilation, 0, 0, 0]);
       gpu.write(this.now[at], now);
     });
-    const shared = { 0: this.uniform, 1: this.places! };
+    const shared = { 0: this.uniform, ...places.bindings(PLACES.first) };
+    const painted = this.painting.bindings(PAINTED.first);
     const painting = [
       gpu.bound(paint, 0, shared),
       gpu.bound(paint, 1, { 0: this.network }),
-      gpu.bound(paint, 2, { 0: this.now[0], 1: this.state!, 2: this.painted }),
+      gpu.bound(paint, 2, { 0: this.now[0], ...painted, ...state.bindings(STATE.first) }),
     ];
     gpu.submit((encoder) => {
       const threads = (cells: number): number => Math.ceil((cells * parts ** 3) / 64);
@@ -288,7 +364,7 @@ export class Layer {
         const groups = [
           gpu.bound(rim, 0, shared),
           gpu.bound(rim, 1, {}),
-          gpu.bound(rim, 2, { 0: this.now[at], 2: this.painted! }),
+          gpu.bound(rim, 2, { 0: this.now[at], ...painted }),
         ];
         run(encoder, rim, groups, threads(sites.beside));
       }
@@ -298,16 +374,17 @@ export class Layer {
   /** Forget everything: the next frame begins from nothing. */
   reset(): void {
     this.release();
-    this.sites = null;
+    this.work = null;
     this.stepsDone = 0;
   }
 
   private release(): void {
-    for (const buffer of [this.places, this.state, this.spare, this.told, this.painted]) {
-      buffer?.destroy();
+    if (this.work !== null) {
+      const { places, state, spare, told, batches } = this.work;
+      for (const old of [places, state, spare, told, ...batches]) old.destroy();
     }
-    this.places = this.state = this.spare = this.told = this.painted = null;
-    this.paintedFor = 0;
+    this.painting?.destroy();
+    this.painting = null;
   }
 
   destroy(): void {

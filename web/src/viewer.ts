@@ -8,7 +8,8 @@ import { say, stop } from "./notice";
 import { oneLine, Problem } from "./problem";
 import { bytesOf, type Show } from "./show";
 import { Smoke } from "./smoke";
-import { DEFAULTS, type Settings, Stage } from "./stage";
+import { DEFAULTS, type Settings } from "./settings";
+import { Stage } from "./stage";
 
 export type Tool = "orbit" | "erase" | "more" | "less";
 
@@ -232,7 +233,7 @@ export class Viewer extends EventTarget {
       say("Choose a second style to brush it on.");
       return;
     }
-    await this.exclusively(() => this.stage.touch(tool, [x - 0.5, 0.5 - y], this.aspect));
+    await this.exclusively(async () => this.stage.touch(tool, [x - 0.5, 0.5 - y], this.aspect));
     this.changed();
   }
 

@@ -17,12 +17,13 @@ from vnca.core.volume import Volume
 from vnca.painting import Painting, StylizeConfig, stylize
 from vnca.recipe import SILENT
 from vnca.recipe.film import FilmConfig, Shown, behind, picture
-from vnca.recipe.sequence import region_bounds
+from vnca.recipe.sequence import region_bounds, region_of
 from vnca.recipe.simulation import simulate
 from vnca.recipe.viewing import ViewRun, run
+from vnca.rule.conditioning import Conditioning, register_conditioning
 from vnca.rule.model import Model, load_style
 from vnca.viewer import SMOKE_NAME
-from vnca.viewer.smoke_file import MAGIC, SmokeFile
+from vnca.viewer.smoke_file import MAGIC, SmokeFile, write_smoke_file
 
 STYLES = ("ink", "church")
 """With γ and density scales that are not each other's."""
@@ -31,6 +32,8 @@ CARRIED, STANDING = "carried", "standing"
 """The first of them, taught and not taught that the velocity carries the state along."""
 CONFIG = StylizeConfig(warmup=8, steps_per_frame=4, seed=5)
 REFINEMENTS = (1, 2)
+FIELDS = {"temperature": (1, 300.0), "wind": (3, 2.0)}
+"""Of the smoke that has some: components, and the value that counts as 1."""
 LEAPS = (0, 2, 3)
 """Frames that are shown, by their place in the sequence, where one is skipped."""
 LEAPS_SPEED = 1.5
@@ -65,6 +68,8 @@ def main(out: Path) -> None:
     shown = [volumes[at] for at in LEAPS]
     paintings = [*stylize(shown, models[STANDING].rule, leaps, box=volumes[0].box)]
     told["leaps"] = {"at": LEAPS, "speed": LEAPS_SPEED, **_written(out / "leaps", paintings)}
+    _wide(site, out / "wide")
+    told["fields"] = _with_fields(site, volumes, models[STYLES[0]], out)
     (out / "reference.json").write_text(json.dumps(told))
     _hostile(site, out / "hostile")
 
@@ -145,7 +150,8 @@ def _hostile(site: Path, out: Path) -> None:
         "model_cut": (model, good[model][: len(good[model]) // 2]),
         "model_newer": (model, described(format_version=99)),
         "model_beyond_its_file": (model, with_header({"hidden": huge})),
-        "model_conditioned": (model, described(conditioning=[["temperature", 1, 300.0]])),
+        "model_conditioned": (model, described(conditioning=[["vorticity", 2]])),
+        "model_on_a_field": (model, described(conditioning=[["temperature", 1, 300.0]])),
         "model_metadata": (model, described(rule="<script>alert(1)</script>")),
         "smoke_no_smoke": (smoke, b"<html>not found</html>"),
         "smoke_cut": (smoke, good[smoke][: start + 100]),
@@ -160,6 +166,53 @@ def _hostile(site: Path, out: Path) -> None:
     for name, (path, content) in cases.items():
         _write(out / name, {**good, path: content}.items())
     (out / "cases.json").write_text(json.dumps([*cases]))
+
+
+def _with_fields(
+    site: Path, volumes: Sequence[Volume], model: Model, out: Path
+) -> dict[str, object]:
+    """A site whose smoke has a temperature and a wind, and a rule that is conditioned on both."""
+    random = np.random.default_rng(3)
+    for name, (width, scale) in FIELDS.items():
+        register_conditioning(Conditioning.of_field(name, width=width, scale=scale))
+    config = replace(model.rule.config, conditioning=(*model.rule.config.conditioning, *FIELDS))
+    more = random.normal(scale=0.2, size=(len(model.rule.hidden), 4)).astype(np.float32)
+    hidden = np.concatenate([model.rule.hidden, more], axis=1)
+    told = replace(model, rule=replace(model.rule, config=config, hidden=hidden))
+    warm = []
+    for smoke in volumes:
+        density = smoke.density_field
+        fields = {
+            "temperature": replace(density, values=np.float32(290) + 400 * density.values),
+            "wind": replace(
+                density, values=random.normal(size=(*density.values.shape, 3)).astype(np.float32)
+            ),
+        }
+        warm.append(replace(smoke, fields=fields))
+    good = {path.relative_to(site): path.read_bytes() for path in site.rglob("*") if path.is_file()}
+    _write(out / "fields", good.items())
+    laid, region = region_of(warm)
+    path = out / "fields" / SMOKE_NAME
+    write_smoke_file(path, laid, region, name="warm", fps=24)
+    _added(out / "fields", {"warm": told})
+    _added(site, {"warm": told})
+    stored = [*SmokeFile(path).volumes()]
+    paintings = [*stylize(stored, told.rule, CONFIG, box=stored[0].box)]
+    return _written(out / "fields", paintings)
+
+
+def _wide(site: Path, out: Path) -> None:
+    """The same smoke in a box that is far larger than it."""
+    good = {path.relative_to(site): path.read_bytes() for path in site.rglob("*") if path.is_file()}
+    smoke = good[Path(SMOKE_NAME)]
+    begin = len(MAGIC) + 4
+    start = begin + struct.unpack("<I", smoke[begin - 4 : begin])[0]
+    header = json.loads(smoke[begin:start])
+    lower, _ = header["box"]
+    header["box"] = [lower, [low + side for low, side in zip(lower, (24, 20, 20), strict=True)]]
+    written = json.dumps(header).encode()
+    good[Path(SMOKE_NAME)] = MAGIC + struct.pack("<I", len(written)) + written + smoke[start:]
+    _write(out, good.items())
 
 
 def _write(folder: Path, files: Iterable[tuple[Path, bytes]]) -> None:
