@@ -2,12 +2,15 @@
 
 import { element } from "./dom";
 import { listen } from "./gestures";
+import { makeHelp } from "./help";
 import { listenToKeys } from "./keys";
-import { restore } from "./link";
+import { restore, within } from "./link";
 import { say, stop, WHERE } from "./notice";
 import { makePanel } from "./panel";
 import { oneLine } from "./problem";
+import { makeRing } from "./ring";
 import { watchRun } from "./run";
+import type { Settings } from "./settings";
 import { readShow } from "./show";
 import { makeStrip } from "./strip";
 import { makeTools } from "./tools";
@@ -31,8 +34,11 @@ async function begin(): Promise<void> {
   else if (!location.hash) await viewer.play();
 }
 
-function known(settings: Record<string, number>, viewer: Viewer): Record<string, number> {
-  return Object.fromEntries(Object.entries(settings).filter(([name]) => name in viewer.stage.settings));
+/** Settings of a show that there are, each as it can be. */
+function known(settings: Record<string, number>, viewer: Viewer): Partial<Settings> {
+  const names = Object.keys(viewer.defaults) as (keyof Settings)[];
+  const given = names.filter((name) => Number.isFinite(settings[name]));
+  return Object.fromEntries(given.map((name) => [name, within(name, settings[name])]));
 }
 
 function build(viewer: Viewer): void {
@@ -49,6 +55,8 @@ function build(viewer: Viewer): void {
     makeTools(viewer),
     makePanel(viewer),
     element("footer", {}, makeStrip(viewer), makeTransport(viewer)),
+    makeRing(viewer),
+    makeHelp(),
   );
   listen(viewer);
   listenToKeys(viewer);

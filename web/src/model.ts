@@ -1,5 +1,6 @@
 // A rule as a model file has it: safetensors with metadata in JSON, checked before it is believed.
 
+import { isAffine, isBox } from "./matrix";
 import { Problem, require } from "./problem";
 
 /** The newest format that is read, as `rule/model.py` writes it. */
@@ -49,7 +50,7 @@ export function readModel(bytes: ArrayBuffer, name: string): Rule {
     return parsed(bytes, name);
   } catch (error) {
     if (error instanceof Problem) throw error;
-    throw new Problem(`${name}: damaged model (${(error as Error).message})`);
+    throw new Problem(`${name}: damaged model`);
   }
 }
 
@@ -73,8 +74,12 @@ function parsed(bytes: ArrayBuffer, name: string): Rule {
     check(fits, `damaged model (${what} is not a number from ${low} to ${high})`);
     return value as number;
   };
-  const channels = number(shape.channels, 4, MOST.channels, "channels");
-  const units = number(shape.hidden, 1, MOST.hidden, "hidden");
+  const whole = (value: unknown, low: number, high: number, what: string): number => {
+    check(Number.isInteger(value), `damaged model (${what} is not a whole number)`);
+    return number(value, low, high, what);
+  };
+  const channels = whole(shape.channels, 4, MOST.channels, "channels");
+  const units = whole(shape.hidden, 1, MOST.hidden, "hidden");
   const listed: unknown[][] =
     about.conditioning ?? Object.entries(WIDTHS).map(([key, width]) => [key, width]);
   check(Array.isArray(listed), "damaged model");
@@ -95,9 +100,9 @@ function parsed(bytes: ArrayBuffer, name: string): Rule {
     output,
     decoder: decoder(header, tensor, channels, name),
     probability: number(shape.update_probability, 1e-9, 1, "update_probability"),
-    steps: number(shape.steps_per_frame, 1, MOST.steps, "steps_per_frame"),
+    steps: whole(shape.steps_per_frame, 1, MOST.steps, "steps_per_frame"),
     transport: transport as boolean,
-    dilation: number(shape.dilation ?? shape.reach ?? 1, 0, MOST.dilation, "dilation"),
+    dilation: whole(shape.dilation ?? shape.reach ?? 1, 0, MOST.dilation, "dilation"),
     wholeBox: shape.domain === "box",
     sobel: number(shape.sobel_divisor, 1e-9, 1e9, "sobel_divisor"),
     laplacian: number(shape.laplacian_divisor, 1e-9, 1e9, "laplacian_divisor"),
@@ -185,10 +190,7 @@ function decoder(
 
 function place(given: any, name: string): Rule["place"] {
   if (given === undefined || given === null) return null;
-  const toWorld: number[][] = given.lattice_to_world;
-  const [lower, upper]: number[][] = given.box;
-  const numbers = [...toWorld.flat(), ...lower, ...upper];
-  const sound = numbers.length === 22 && numbers.every((n) => Number.isFinite(n) && Math.abs(n) < 1e30);
-  require(sound && lower.every((low, axis) => low < upper[axis]), `${name}: its place cannot be`);
-  return { toWorld, lower, upper };
+  const { lattice_to_world: toWorld, box } = given;
+  require(isAffine(toWorld) && isBox(box), `${name}: its place cannot be`);
+  return { toWorld, lower: box[0], upper: box[1] };
 }

@@ -99,17 +99,7 @@ export class Picture {
   refine(parts: number): void {
     if (parts === this.parts) return;
     this.release();
-    const { lower, upper } = this.smoke;
-    this.size = lower.map((low, axis) => (upper[axis] - low) * parts + 2);
-    const most = this.gpu.device.limits.maxTextureDimension3D;
-    const texels = this.size.reduce((product, side) => product * side, 1);
-    if (Math.max(...this.size) > most || texels > MOST_TEXELS) {
-      const sides = this.size.join(" × ");
-      throw new Problem(
-        `A volume of ${sides} (${mebibytes(8 * texels)}) is more than this page draws: choose a ` +
-          "smaller sequence or less detail.",
-      );
-    }
+    this.size = drawnSize(this.gpu, this.smoke, parts);
     this.parts = parts;
     this.textures = [0, 1].map(() => this.texture(this.size));
     this.makeBlocks();
@@ -320,6 +310,20 @@ export class Picture {
     this.release();
     for (const old of [this.camera, this.nothing, ...this.looks]) old.destroy();
   }
+}
+
+/** Cells of what is drawn along each axis; more than a page can draw are refused. */
+export function drawnSize(gpu: Gpu, { lower, upper }: Smoke, parts: number): Vector {
+  const size = lower.map((low, axis) => (upper[axis] - low) * parts + 2);
+  const most = gpu.device.limits.maxTextureDimension3D;
+  const texels = size.reduce((product, side) => product * side, 1);
+  if (Math.max(...size) > most || texels > MOST_TEXELS) {
+    throw new Problem(
+      `A volume of ${size.join(" × ")} (${mebibytes(8 * texels)}) is more than this page draws: ` +
+        "choose a smaller sequence or less detail.",
+    );
+  }
+  return size;
 }
 
 /** A unit vector of the world along the axes of the cells, which are cubes. */

@@ -7,7 +7,7 @@ import type { Gpu } from "./gpu";
 import { Layer } from "./layer";
 import type { Vector } from "./matrix";
 import type { Rule } from "./model";
-import { type Look, Picture, PICTURE, worldCorners } from "./picture";
+import { drawnSize, type Look, Picture, PICTURE, worldCorners } from "./picture";
 import { Screen } from "./screen";
 import { DEFAULTS, type Settings } from "./settings";
 import type { Frame, Smoke } from "./smoke";
@@ -41,6 +41,7 @@ export class Stage {
   }
 
   static async create(gpu: Gpu, smoke: Smoke, format: GPUTextureFormat): Promise<Stage> {
+    drawnSize(gpu, smoke, 1);
     const [painting, plain, brush, screen] = await Promise.all([
       Picture.create(gpu, smoke),
       Picture.create(gpu, smoke),

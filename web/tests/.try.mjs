@@ -1,11 +1,13 @@
-import { launch, open, openStill, serve } from "/work/wt/web/web/tests/browser.mjs";
-const site = process.argv[2];
+import { launch, open, serve } from "./browser.mjs";
+const [site, bytes, hash] = process.argv.slice(2);
+const script = Number(bytes) ? "const limits = Object.getOwnPropertyDescriptor(GPUDevice.prototype, 'limits');" +
+  "Object.defineProperty(GPUDevice.prototype, 'limits', { get() {" +
+  "  return new Proxy(limits.get.call(this), { get: (all, name) =>" +
+  `    name === 'maxStorageBufferBindingSize' ? ${bytes} : all[name] }); } });` : undefined;
 const browser = await launch(); const server = await serve(site);
-const still = await openStill(browser, server.address);
-console.log(await still.page.evaluate(async () => {
-  const a = await navigator.gpu.requestAdapter(); const l = {};
-  for (const k of ["maxStorageBufferBindingSize","maxBufferSize","maxStorageBuffersPerShaderStage","maxStorageBuffersInFragmentStage","maxTextureDimension3D"]) l[k]=a.limits[k];
-  return {l, info: [a.info.vendor, a.info.architecture, a.info.description], features:[...a.features].join(), cells: viewer.stage.layers[0].sites.cells, beside: viewer.stage.layers[0].sites.beside, places: viewer.stage.layers[0].sites.places.length, words: viewer.stage.buffers.words.layout.count, box: [viewer.smoke.lower, viewer.smoke.upper]};
-}));
-console.log(still.errors, still.foreign);
+const o = await open(browser, `${server.address}#frame=0`, { script });
+await Promise.race([o.page.waitForSelector("body.ready"), o.page.waitForSelector("#stopped")]);
+console.log(await o.page.evaluate(() => [document.getElementById("reason")?.textContent, document.getElementById("notice")?.textContent]), o.errors);
+await o.page.waitForTimeout(1000);
+console.log(await o.page.evaluate(() => viewer.stage.layers.map((l) => [l.sites?.cells, l.sites?.beside, l.places?.layout, l.state?.layout, l.painted?.layout, viewer.stage.brush.brushed.layout, viewer.stage.buffers.words.layout])));
 await browser.close(); server.close();
