@@ -1,20 +1,20 @@
 // The page: reads what it is to show, opens the GPU, and puts its parts on the screen.
 
-import { element } from "./dom";
-import { listen } from "./gestures";
-import { makeHelp } from "./help";
-import { listenToKeys } from "./keys";
-import { restore, within } from "./link";
-import { say, stop, WHERE } from "./notice";
-import { makePanel } from "./panel";
+import { element } from "./page/dom";
+import { listen } from "./page/gestures";
+import { makeHelp } from "./page/help";
+import { listenToKeys } from "./page/keys";
+import { restore, within } from "./page/link";
+import { say, stop, WHERE } from "./page/notice";
+import { makePanel } from "./page/panel";
 import { oneLine } from "./problem";
-import { makeRing } from "./ring";
-import { watchRun } from "./run";
+import { makeRing } from "./page/ring";
+import { watchRun } from "./page/run";
 import type { Settings } from "./settings";
-import { readShow } from "./show";
-import { makeStrip } from "./strip";
-import { makeTools } from "./tools";
-import { makeTransport } from "./transport";
+import { readShow } from "./page/show";
+import { makeStrip } from "./page/strip";
+import { makeTools } from "./page/tools";
+import { makeTransport } from "./page/transport";
 import { Viewer } from "./viewer";
 
 const canvas = document.getElementById("canvas") as HTMLCanvasElement;

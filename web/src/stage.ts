@@ -1,16 +1,16 @@
 // What happens: frames of smoke, one or two rules at work on them, brushes, and the picture of it.
 
-import { Brush, type Stroke } from "./brush";
-import { type Camera, frameBox, viewAxes } from "./camera";
-import { FrameBuffers } from "./frame";
-import type { Gpu } from "./gpu";
-import { Layer } from "./layer";
+import { Brush, type Stroke } from "./picture/brush";
+import { type Camera, frameBox, viewAxes } from "./picture/camera";
+import { FrameBuffers } from "./smoke/frame";
+import type { Gpu } from "./gpu/gpu";
+import { Layer } from "./automaton/layer";
 import type { Vector } from "./matrix";
-import type { Rule } from "./model";
-import { drawnSize, type Look, Picture, PICTURE, worldCorners } from "./picture";
-import { Screen } from "./screen";
+import type { Rule } from "./automaton/model";
+import { drawnSize, type Look, Picture, PICTURE, worldCorners } from "./picture/picture";
+import { Screen } from "./picture/screen";
 import { DEFAULTS, type Settings } from "./settings";
-import type { Frame, Smoke } from "./smoke";
+import type { Frame, Smoke } from "./smoke/smoke";
 
 /** Frames up to which the velocity of one carries states over those that are skipped. */
 const NEAR = 4;

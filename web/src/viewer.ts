@@ -1,13 +1,13 @@
 // The loop: what is shown on the canvas, when, and how finely; and what a user can do with it.
 
-import type { Camera } from "./camera";
-import { Gpu } from "./gpu";
-import { pinholeMoved } from "./gestures";
-import { readModel, type Rule } from "./model";
-import { say, stop } from "./notice";
+import type { Camera } from "./picture/camera";
+import { Gpu } from "./gpu/gpu";
+import { pinholeMoved } from "./page/gestures";
+import { readModel, type Rule } from "./automaton/model";
+import { say, stop } from "./page/notice";
 import { oneLine, Problem } from "./problem";
-import { bytesOf, type Show } from "./show";
-import { Smoke } from "./smoke";
+import { bytesOf, type Show } from "./page/show";
+import { Smoke } from "./smoke/smoke";
 import { DEFAULTS, type Settings } from "./settings";
 import { Stage } from "./stage";
 

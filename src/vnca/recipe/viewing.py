@@ -176,6 +176,11 @@ def _shown(options: ViewRun, watch: Watch) -> _Shown:
     rules = _rules(given, options)
     asked = options.sequence or (None if given is None else _training_frame(options.model))
     if asked is None:
+        if smoke.fields:
+            raise OptionError(
+                f"`sequence`: a plume that is simulated has no {', '.join(smoke.fields)}, as "
+                f"{options.model or '`smoke.fields`'} asks for; name a sequence that has"
+            )
         watch.note("no sequence given: a plume is simulated")
         frames = [*simulate("plume", resolution=_RESOLUTION, frames=_FRAMES, watch=watch)]
         laid, region = region_of(frames)

@@ -1,17 +1,17 @@
 // From what layers have painted to a picture: the volume that is drawn, the light in it, the rays.
 
-import lightCode from "./shaders/light.wgsl";
-import marchCode from "./shaders/march.wgsl";
-import volumeCode from "./shaders/volume.wgsl";
+import lightCode from "../shaders/light.wgsl";
+import marchCode from "../shaders/march.wgsl";
+import volumeCode from "../shaders/volume.wgsl";
 import { type Camera, pinhole, slope, viewAxes } from "./camera";
-import { type Gpu, mebibytes, run } from "./gpu";
-import { type FrameBuffers, smokeShader } from "./frame";
-import type { Layer } from "./layer";
-import { affineInverse, applied, rotated, scaled, type Matrix4, type Vector } from "./matrix";
-import { Problem } from "./problem";
-import { Layout, type Rows } from "./rows";
-import { PLACES, sitesShader } from "./sites";
-import type { Smoke } from "./smoke";
+import { type Gpu, mebibytes, run } from "../gpu/gpu";
+import { type FrameBuffers, smokeShader } from "../smoke/frame";
+import type { Layer } from "../automaton/layer";
+import { affineInverse, applied, rotated, scaled, type Matrix4, type Vector } from "../matrix";
+import { Problem } from "../problem";
+import { Layout, type Rows } from "../gpu/rows";
+import { PLACES, sitesShader } from "../automaton/sites";
+import type { Smoke } from "../smoke/smoke";
 
 /** Blocks of the light along the longest side: shadows are soft. */
 const FINEST = 96;

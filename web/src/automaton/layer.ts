@@ -1,15 +1,15 @@
 // A rule at work: its state on the active cells of a frame, stepped, carried on and painted.
 
-import type { FrameBuffers } from "./frame";
-import { type Bindings, type Gpu, run } from "./gpu";
-import { maskKey, maskThreshold, packedDecoder, packedWeights, quarters, stencil } from "./automaton";
-import { affineInverse, product } from "./matrix";
+import type { FrameBuffers } from "../smoke/frame";
+import { type Bindings, type Gpu, run } from "../gpu/gpu";
+import { maskKey, maskThreshold, packedDecoder, packedWeights, quarters, stencil } from "./weights";
+import { affineInverse, product } from "../matrix";
 import type { Rule } from "./model";
-import { require } from "./problem";
+import { require } from "../problem";
 import { PAINTED, Programs, STATE, WANTED_PLACES } from "./programs";
-import { Layout, Rows } from "./rows";
+import { Layout, Rows } from "../gpu/rows";
 import { findSites, PLACES, RIM, type Sites } from "./sites";
-import type { Smoke } from "./smoke";
+import type { Smoke } from "../smoke/smoke";
 
 const SLOT = 256; // bytes between uniforms of steps
 const AT_ONCE = 64; // steps

@@ -1,6 +1,6 @@
 // The GPU: opened with what the adapter has, and shaders made ready to run on it.
 
-import { Problem } from "./problem";
+import { Problem } from "../problem";
 
 /** What is asked for as large as the adapter has it. */
 const LIMITS = [

@@ -1,6 +1,6 @@
 // What this page was given to show: `viewer/__init__.py`.
 
-import { Problem } from "./problem";
+import { Problem } from "../problem";
 
 export interface ShownRule {
   name: string;

@@ -1,9 +1,9 @@
 // A ring around the pointer, as wide as the brush is where the camera looks at.
 
-import { slope } from "./camera";
+import { slope } from "../picture/camera";
 import { element } from "./dom";
-import { spacing } from "./picture";
-import type { Viewer } from "./viewer";
+import { spacing } from "../picture/picture";
+import type { Viewer } from "../viewer";
 
 export function makeRing(viewer: Viewer): HTMLElement {
   const ring = element("div", { id: "ring", "aria-hidden": "true" });

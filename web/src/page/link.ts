@@ -1,7 +1,7 @@
 // A link that restores what is seen: what differs from the defaults, after the # of the address.
 
-import type { Viewer } from "./viewer";
-import { DEFAULTS, type Settings } from "./settings";
+import type { Viewer } from "../viewer";
+import { DEFAULTS, type Settings } from "../settings";
 
 const NAMES = Object.keys(DEFAULTS) as (keyof Settings)[];
 const CAMERA = ["azimuth", "elevation", "distance"] as const;

@@ -1,16 +1,16 @@
 // Brushes: what a finger does to the smoke that it points at.
 
-import blendCode from "./shaders/blend.wgsl";
-import brushCode from "./shaders/brush.wgsl";
-import meetCode from "./shaders/meet.wgsl";
+import blendCode from "../shaders/blend.wgsl";
+import brushCode from "../shaders/brush.wgsl";
+import meetCode from "../shaders/meet.wgsl";
 import { type Camera, pinhole, slope, viewAxes } from "./camera";
-import { type FrameBuffers, smokeShader } from "./frame";
-import { type Gpu, run } from "./gpu";
-import type { Layer } from "./layer";
-import { plus, scaled, type Vector } from "./matrix";
+import { type FrameBuffers, smokeShader } from "../smoke/frame";
+import { type Gpu, run } from "../gpu/gpu";
+import type { Layer } from "../automaton/layer";
+import { plus, scaled, type Vector } from "../matrix";
 import { alongCells, BRUSHED, type Picture } from "./picture";
-import { Layout, Rows } from "./rows";
-import type { Smoke } from "./smoke";
+import { Layout, Rows } from "../gpu/rows";
+import type { Smoke } from "../smoke/smoke";
 
 export type Stroke = "erase" | "more" | "less";
 

@@ -1,18 +1,18 @@
 // The shaders of a layer: of a rule of such a shape, on arrays in so many parts.
 
-import brushCode from "./shaders/brush.wgsl";
-import carryCode from "./shaders/carry.wgsl";
-import conditionCode from "./shaders/condition.wgsl";
-import eraseCode from "./shaders/erase.wgsl";
-import paintCode from "./shaders/paint.wgsl";
-import decoderCode from "../../src/vnca/engine/wgsl/decoder.wgsl";
-import stepCode from "../../src/vnca/engine/wgsl/step.wgsl";
-import { quarters } from "./automaton";
-import { smokeShader } from "./frame";
+import brushCode from "../shaders/brush.wgsl";
+import carryCode from "../shaders/carry.wgsl";
+import conditionCode from "../shaders/condition.wgsl";
+import eraseCode from "../shaders/erase.wgsl";
+import paintCode from "../shaders/paint.wgsl";
+import decoderCode from "../../../src/vnca/engine/wgsl/decoder.wgsl";
+import stepCode from "../../../src/vnca/engine/wgsl/step.wgsl";
+import { quarters } from "./weights";
+import { smokeShader } from "../smoke/frame";
 import type { Rule } from "./model";
-import type { Layout } from "./rows";
+import type { Layout } from "../gpu/rows";
 import { sitesShader } from "./sites";
-import type { Smoke } from "./smoke";
+import type { Smoke } from "../smoke/smoke";
 
 /** Bindings of arrays in parts; those of the state are in another group where it is painted. */
 export const STATE = { group: 0, first: 512, element: "vec4f", width: "PLANES" };

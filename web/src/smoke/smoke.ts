@@ -1,7 +1,7 @@
 // A sequence of smoke, read a frame at a time: `viewer/smoke_file.py` says how it is written.
 
-import { isAffine, isBox } from "./matrix";
-import { Problem, require } from "./problem";
+import { isAffine, isBox } from "../matrix";
+import { Problem, require } from "../problem";
 
 const MAGIC = "vncasmk1";
 const START = 1 << 16; // bytes asked for first: the header of most sequences

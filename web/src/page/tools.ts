@@ -4,9 +4,9 @@ import { button, element } from "./dom";
 import { toggleHelp } from "./help";
 import { linkTo } from "./link";
 import { say } from "./notice";
-import { oneLine } from "./problem";
+import { oneLine } from "../problem";
 import { film, picture, save } from "./save";
-import type { Tool, Viewer } from "./viewer";
+import type { Tool, Viewer } from "../viewer";
 
 const ICONS = {
   orbit: "M12 4a8 8 0 1 0 8 8M20 4v5h-5",

@@ -1,9 +1,9 @@
 // The smoke of a frame on the GPU, shared by layers, pictures and brushes.
 
-import smokeCode from "./shaders/smoke.wgsl";
-import type { Gpu } from "./gpu";
-import { Layout, Rows } from "./rows";
-import { NOWHERE } from "./sites";
+import smokeCode from "../shaders/smoke.wgsl";
+import type { Gpu } from "../gpu/gpu";
+import { Layout, Rows } from "../gpu/rows";
+import { NOWHERE } from "../automaton/sites";
 import type { Frame, Smoke } from "./smoke";
 
 const WORDS = { group: 2, first: 16, element: "u32" };

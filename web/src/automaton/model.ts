@@ -1,7 +1,7 @@
 // A rule as a model file has it: safetensors with metadata in JSON, checked before it is believed.
 
-import { isAffine, isBox } from "./matrix";
-import { Problem, require } from "./problem";
+import { isAffine, isBox } from "../matrix";
+import { Problem, require } from "../problem";
 
 /** The newest format that is read, as `rule/model.py` writes it. */
 const FORMAT = 4;

@@ -4,7 +4,7 @@ import { turn, zoom } from "./gestures";
 import { toggleHelp } from "./help";
 import { choose, copyLink, savePicture, toggleAlive, toggleBeside, togglePanel } from "./tools";
 import { toggle } from "./transport";
-import type { Viewer } from "./viewer";
+import type { Viewer } from "../viewer";
 
 export function listenToKeys(viewer: Viewer): void {
   const byKey: Record<string, (event: KeyboardEvent) => void> = {

@@ -1,9 +1,9 @@
 // Which cells are active in a frame, and where they lie: what `engine/domain.py` finds, brick by
 // brick, and the cells beside them to which their colour goes on.
 
-import sitesCode from "../../src/vnca/engine/wgsl/sites.wgsl";
-import type { Layout } from "./rows";
-import type { Frame, Smoke, Vec3 } from "./smoke";
+import sitesCode from "../../../src/vnca/engine/wgsl/sites.wgsl";
+import type { Layout } from "../gpu/rows";
+import type { Frame, Smoke, Vec3 } from "../smoke/smoke";
 
 export const NOWHERE = 0xffffffff;
 /** Normalised density from which a cell counts as smoke. */

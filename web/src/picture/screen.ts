@@ -1,8 +1,8 @@
 // The finished picture: in front of its background, on the screen or as pixels.
 
-import presentCode from "./shaders/present.wgsl";
-import type { Gpu } from "./gpu";
-import type { Settings } from "./settings";
+import presentCode from "../shaders/present.wgsl";
+import type { Gpu } from "../gpu/gpu";
+import type { Settings } from "../settings";
 
 /** Linear, of #101014. */
 const BACKGROUND = [0.005181516702338386, 0.005181516702338386, 0.006995410187265387];
