@@ -42,15 +42,19 @@ export class Layout {
     const at = width === undefined ? row : `(${row}) * ${width} + place`;
     const given = width === undefined ? "row: u32" : "row: u32, place: u32";
     const access = isWritten ? "read_write" : "read";
-    const numbers = Array.from({ length: parts }, (_, part) => part);
-    const chosen = (act: (part: number) => string): string =>
-      [...numbers].reverse().map((part) => `  ${part > 0 ? `if (row >= ${part * each}u) ` : ""}{ ${act(part)} }\n`).join("");
-    const bindings = numbers.map((part) => {
+    const bindings = Array.from({ length: parts }, (_, part) => {
       const place = `@group(${group}) @binding(${first + part})`;
       return `${place} var<storage, ${access}> ${name}_${part}: array<${element}>;\n`;
     });
-    const reading = `fn ${name}_at(${given}) -> ${element} {\n  let at = ${at};\n${chosen((part) => `return ${name}_${part}[at];`)}}\n`;
-    const writing = `fn set_${name}(${given}, value: ${element}) {\n  let at = ${at};\n${chosen((part) => `${name}_${part}[at] = value; return;`)}}\n`;
+    // The last part first: rows of the one before begin earlier.
+    const inPart = (act: (array: string) => string): string =>
+      Array.from({ length: parts }, (_, k) => parts - 1 - k)
+        .map((part) => `${part > 0 ? `if (row >= ${part * each}u) ` : ""}{ ${act(`${name}_${part}[at]`)} }\n`)
+        .join("  ");
+    const begin = `{\n  let at = ${at};\n  `;
+    const reading = `fn ${name}_at(${given}) -> ${element} ${begin}${inPart((array) => `return ${array};`)}}\n`;
+    const write = `fn set_${name}(${given}, value: ${element}) ${begin}`;
+    const writing = `${write}${inPart((array) => `${array} = value; return;`)}}\n`;
     return `${bindings.join("")}${reading}${isWritten ? writing : ""}`;
   }
 }

@@ -21,9 +21,15 @@ const ROWS: [what: string, how: string, keys: string][] = [
 /** The sheet, closed. */
 export function makeHelp(): HTMLDialogElement {
   const rows = ROWS.map(([what, how, keys]) =>
-    element("tr", {}, element("th", { scope: "row" }, what), element("td", {}, how), element("td", { class: "keys" }, keys)),
+    element(
+      "tr",
+      {},
+      element("th", { scope: "row" }, what),
+      element("td", {}, how),
+      element("td", { class: "keys" }, keys),
+    ),
   );
-  const close = element("button", { type: "button", class: "close", "aria-label": "Close", autofocus: true }, "Close");
+  const close = element("button", { type: "button", class: "close", autofocus: true }, "Close");
   const sheet = element(
     "dialog",
     { id: "help", "aria-label": "What can be done" },

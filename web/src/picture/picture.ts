@@ -45,8 +45,18 @@ export interface Look {
 }
 
 /** Bindings of what is drawn: what a rule has painted, and where more of it is seen. */
-const PAINTED = { group: 1, first: 16, element: "vec4f", width: "u32(look.parts * look.parts * look.parts)" };
-export const BRUSHED = { group: 1, first: 512, element: "f32", width: "u32((smoke.upper.y - smoke.lower.y) * (smoke.upper.z - smoke.lower.z))" };
+const PAINTED = {
+  group: 1,
+  first: 16,
+  element: "vec4f",
+  width: "u32(look.parts * look.parts * look.parts)",
+};
+export const BRUSHED = {
+  group: 1,
+  first: 512,
+  element: "f32",
+  width: "u32((smoke.upper.y - smoke.lower.y) * (smoke.upper.z - smoke.lower.z))",
+};
 
 function volumeShader(places: Layout, painted: Layout, brushed: Layout, words: Layout): string {
   const arrays = `${painted.declared("painted", PAINTED)}${brushed.declared("brushed", BRUSHED)}`;
