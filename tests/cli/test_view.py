@@ -4,6 +4,7 @@ import json
 import threading
 import urllib.request
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import pytest
 from vnca.recipe import SILENT
 from vnca.recipe.viewing import ViewRun
 from vnca.recipe.viewing import run as show
-from vnca.rule.model import MODEL_NAME, style_names
+from vnca.rule import conditioning
+from vnca.rule.conditioning import Conditioning
+from vnca.rule.model import MODEL_NAME, Model, style_names
 from vnca.viewer.smoke_file import SmokeFile
 
 Vnca = Callable[..., Any]
@@ -84,6 +87,25 @@ def test_mistakes_are_one_line(vnca: Vnca, smoke: Path, tmp_path: Path) -> None:
     file.write_text("mine")
     assert str(file) in vnca("view", "ink", smoke, "--export", file).complaint
     assert file.read_text() == "mine"
+
+
+def test_fields_that_a_rule_is_conditioned_on_are_brought_along(
+    vnca: Vnca, model: Path, smoke: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(conditioning, "_KNOWN", dict(conditioning._KNOWN))
+    conditioning.register_conditioning(Conditioning.of_field("temperature", scale=300))
+    made = Model.load(model)
+    config = replace(made.rule.config, conditioning=("density", "temperature"))
+    hidden = made.rule.hidden[:, :-5]
+    replace(made, rule=replace(made.rule, config=config, hidden=hidden)).save(model / MODEL_NAME)
+    site = tmp_path / "site"
+    told = vnca("view", model, smoke, "--export", site)
+    assert told.code == 0, told.err
+    file = SmokeFile(site / "smoke.bin")
+    assert [(field.name, field.width) for field in file.fields] == [("temperature", 1)]
+    first = next(file.volumes())
+    assert first.named_fields["temperature"].values.max() > 0
+    assert "a plume that is simulated has no temperature" in vnca("view", model).complaint
 
 
 def test_a_training_is_watched_while_it_runs(

@@ -1,6 +1,7 @@
 """Every backend of the update step against the reference in float64."""
 
 import dataclasses
+import os
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -12,8 +13,8 @@ from torch import Tensor
 
 from vnca.core import AnyArray, FloatArray, IntArray
 from vnca.core.errors import ShapeError
-from vnca.engine import PRECISIONS, native
-from vnca.engine.automaton import Weights, changing_rows, stencil
+from vnca.engine import PRECISIONS, Compute, backend_named, native, open_session
+from vnca.engine.automaton import Automaton, Weights, changing_rows, stencil
 from vnca.engine.domain import Border, Domain
 from vnca.engine.native.autograd import update as native_update
 from vnca.engine.reference import equations as reference
@@ -39,6 +40,9 @@ needs_triton = pytest.mark.skipif(
 needs_gpu = pytest.mark.skipif(not GPU, reason="not interpreted: bfloat16, tensor cores")
 triton_update = partial(triton_backend.update, precision="ieee")
 
+WGSL = backend_named("wgsl").missing(Compute("wgsl"))
+SEED, STEP = 0, 1
+
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
@@ -53,6 +57,7 @@ class Problem:
     output: FloatArray
     stencil: FloatArray
     gradient: FloatArray
+    domain: Domain
 
     def with_(self, **changes: AnyArray) -> "Problem":
         return dataclasses.replace(self, **changes)
@@ -65,7 +70,7 @@ class Problem:
 
     @property
     def _arrays(self) -> tuple[AnyArray, ...]:
-        return tuple(getattr(self, field.name) for field in dataclasses.fields(self))
+        return tuple(getattr(self, field.name) for field in dataclasses.fields(self)[:-1])
 
 
 def problem(
@@ -89,7 +94,7 @@ def problem(
     state[-1] = 0
     return Problem(
         state,
-        changing_rows(domain.hashes, seed=0, step=1, probability=probability),
+        changing_rows(domain.hashes, seed=SEED, step=STEP, probability=probability),
         domain.neighbours,
         draw(n, priors),
         draw(hidden, 5 * channels + priors, scale=0.1),
@@ -97,6 +102,7 @@ def problem(
         draw(channels, hidden, scale=0.1),
         stencil(sobel_divisor=30.0),
         draw(n + 1, channels),
+        domain,
     )
 
 
@@ -176,6 +182,27 @@ def test_a_step_and_all_its_gradients_agree_with_the_reference(case: str, backen
         got = {"state": p.forward(**options), **dict(gradients)}
         short = options["precision"] == "bfloat16"
         (assert_close_to_bfloat16 if short else assert_conforms)(got, exact)
+
+
+# Hundreds of hidden units take minutes on a software driver.
+WGSL_CASES = {name: CASES[name] for name in CASES if name != "wide"}
+WGSL_CASES["32³"] = {"shape": (32, 32, 32), "hidden": 96}
+
+
+@pytest.mark.parametrize("case", WGSL_CASES)
+def test_a_step_in_wgsl_agrees_with_the_reference(case: str) -> None:
+    if WGSL is not None and os.environ.get("CI"):
+        pytest.fail(WGSL)  # there, a device has to be
+    if WGSL is not None:
+        pytest.skip(WGSL)
+    given = WGSL_CASES[case]
+    p = problem(**given)
+    weights = Weights(p.hidden, p.bias, p.output)
+    rule = Automaton(weights, p.stencil, given.get("probability", 0.5), seed=SEED)
+    session = open_session(rule, p.domain, p.priors, Compute("wgsl"))
+    got = session.read(session.step(session.upload(p.state), STEP))
+    exact = run(reference.update, p, torch.float64)
+    assert_conforms({"state": got}, {"state": exact["state"]})
 
 
 def joined(first: Problem, second: Problem) -> Problem:

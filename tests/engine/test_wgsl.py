@@ -1,5 +1,6 @@
 """The shaders against the readable backends: on Mesa's lavapipe, where no GPU is."""
 
+import os
 from dataclasses import replace
 from typing import Any
 
@@ -13,12 +14,22 @@ from vnca.engine import Compute, backend_named, choose, compute_of, open_session
 from vnca.engine import numpy as readable
 from vnca.engine.automaton import Automaton, DecoderWeights, Weights, stencil
 from vnca.engine.domain import Border, Domain, subdivided
+from vnca.engine.wgsl import device, session
+from vnca.engine.wgsl.parts import Rows
 from vnca.painting import StylizeConfig, stylize
 from vnca.rule import Rule
 from vnca.rule.model import load_style
 
 MISSING = backend_named("wgsl").missing(Compute("wgsl"))
-pytestmark = pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
+
+
+@pytest.fixture(autouse=True)
+def device_is_there() -> None:
+    """Skipped at home without a device; continuous integration has to have one."""
+    if MISSING is not None and os.environ.get("CI"):
+        pytest.fail(MISSING)
+    if MISSING is not None:
+        pytest.skip(MISSING)
 
 
 def drawn(seed: int, *shape: int, scale: float = 0.2) -> FloatArray:
@@ -33,8 +44,8 @@ def automaton(channels: int, hidden: int, told: int, probability: float) -> Auto
 
 
 def after(rule: Automaton, domain: Domain, told: FloatArray, state: FloatArray, **compute: Any):
-    session = open_session(rule, domain, told, Compute(**compute))
-    return session.read(session.run(session.upload(state), range(4, 8)))
+    opened = open_session(rule, domain, told, Compute(**compute))
+    return opened.read(opened.run(opened.upload(state), range(4, 8)))
 
 
 @pytest.mark.parametrize("border", ["replicate", "circular"])
@@ -124,12 +135,48 @@ def test_it_is_chosen_by_name_and_asks_torch_for_nothing() -> None:
         choose(Compute("wgsl"), differentiable=True)
 
 
-def test_what_the_device_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from vnca.engine.wgsl import device, session
+@pytest.mark.parametrize("precision", ["float32", "float16"])
+def test_what_is_bound_in_parts_is_the_same_to_the_bit(
+    monkeypatch: pytest.MonkeyPatch, precision: str
+) -> None:
+    reason = backend_named("wgsl").missing(Compute("wgsl", precision=precision))
+    if reason is not None:
+        pytest.skip(reason)
+    domain = Domain.from_mask(np.random.default_rng(1).random((16, 16, 16)) < 0.8, (-3, 0, 5))
+    rule = automaton(12, 32, 7, 0.5)
+    state, told = drawn(4, len(domain) + 1, 12), drawn(5, len(domain), 7)
+    state[-1] = 0
+    shapes = DecoderWeights.shapes(12, 8)
+    layers = DecoderWeights(*(drawn(2 + k, *s, scale=1.5) for k, s in enumerate(shapes)))
+    cells = np.arange(len(domain), dtype=np.int32)
+    rows, fractions = subdivided(cells, domain.neighbours, 2)
+    decoding = backend_named("wgsl").array_decode()
 
-    limits = {"max-storage-buffer-binding-size": 1000}
-    small = type("Small", (), {"limits": limits})()
-    monkeypatch.setattr(device, "device", lambda: small)
+    def both() -> tuple[FloatArray, FloatArray, FloatArray]:
+        opened = open_session(rule, domain, told, Compute("wgsl", precision=precision))
+        uploaded = opened.upload(state)
+        stepped = opened.read(opened.run(uploaded, range(4, 8)))
+        again = opened.conditioned(2 * told)
+        changed = again.read(again.run(uploaded, range(2)))
+        return stepped, changed, decoding.decode(stepped, rows, fractions, layers)
+
+    whole = both()
+    monkeypatch.setattr(device, "binding_bytes", lambda: 20_000)
+    divided = Rows.of(state)
+    assert divided.layout.parts > 8
+    np.testing.assert_array_equal(divided.read(np.float32), state.reshape(-1))
+    for ours, theirs in zip(both(), whole, strict=True):
+        assert np.abs(theirs).max() > 0.1
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_what_the_device_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    domain = Domain.from_mask(np.ones((24, 24, 24), bool), (0, 0, 0))
+    given = (automaton(12, 8, 7, 0.5), domain, drawn(0, len(domain), 7))
+    monkeypatch.setattr(device, "binding_bytes", lambda: 16_000)
+    with pytest.raises(OutOfMemoryError, match=r"in \d+ parts of 0.0153 MiB, and .* binds at most"):
+        open_session(*given, Compute("wgsl"))
+    monkeypatch.setattr(device, "binding_bytes", lambda: 1000)
     with pytest.raises(OutOfMemoryError, match="binds at most 0 MiB"):
         device.Buffer.empty(1001)
     monkeypatch.undo()

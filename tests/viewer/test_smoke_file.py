@@ -51,6 +51,26 @@ def test_smoke_without_velocity_is_a_quarter_as_large(tiny_smoke: Volume, tmp_pa
     assert found.velocity_field is None
 
 
+def test_fields_come_back_near_the_smoke(tiny_smoke: Volume, tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    shape = tiny_smoke.density.shape
+    told = {
+        "temperature": random.uniform(280, 900, shape).astype(np.float32),
+        "wind": random.normal(size=(*shape, 3)).astype(np.float32),
+        "nothing": np.zeros(shape, np.float32),
+    }
+    given = [replace(tiny_smoke, fields=told, frame=1), replace(tiny_smoke, frame=2)]
+    laid, region = region_of(given)
+    write_smoke_file(tmp_path / "warm.bin", laid, region, name="warm", fps=24)
+    found, without = SmokeFile(tmp_path / "warm.bin").volumes()
+    box, smoke = found.box, found.density_field.dense(found.box) > 0
+    for name, field in laid[0].named_fields.items():
+        theirs, ours = found.named_fields[name].dense(box)[smoke], field.dense(box)[smoke]
+        np.testing.assert_allclose(theirs, ours, atol=2e-5 * max(np.abs(ours).max(), 1))
+        assert not without.named_fields[name].values.any()
+    assert found.velocity_field is not None
+
+
 def test_nothing_to_show_is_said(tiny_smoke: Volume, tmp_path: Path) -> None:
     laid, region = region_of([tiny_smoke])
     empty = replace(tiny_smoke, density=np.zeros_like(tiny_smoke.density), frame=3)

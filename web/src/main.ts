@@ -1,17 +1,20 @@
 // The page: reads what it is to show, opens the GPU, and puts its parts on the screen.
 
-import { element } from "./dom";
-import { listen } from "./gestures";
-import { listenToKeys } from "./keys";
-import { restore } from "./link";
-import { say, stop, WHERE } from "./notice";
-import { makePanel } from "./panel";
+import { element } from "./page/dom";
+import { listen } from "./page/gestures";
+import { makeHelp } from "./page/help";
+import { listenToKeys } from "./page/keys";
+import { restore, within } from "./page/link";
+import { say, stop, WHERE } from "./page/notice";
+import { makePanel } from "./page/panel";
 import { oneLine } from "./problem";
-import { watchRun } from "./run";
-import { readShow } from "./show";
-import { makeStrip } from "./strip";
-import { makeTools } from "./tools";
-import { makeTransport } from "./transport";
+import { makeRing } from "./page/ring";
+import { watchRun } from "./page/run";
+import type { Settings } from "./settings";
+import { readShow } from "./page/show";
+import { makeStrip } from "./page/strip";
+import { makeTools } from "./page/tools";
+import { makeTransport } from "./page/transport";
 import { Viewer } from "./viewer";
 
 const canvas = document.getElementById("canvas") as HTMLCanvasElement;
@@ -31,8 +34,11 @@ async function begin(): Promise<void> {
   else if (!location.hash) await viewer.play();
 }
 
-function known(settings: Record<string, number>, viewer: Viewer): Record<string, number> {
-  return Object.fromEntries(Object.entries(settings).filter(([name]) => name in viewer.stage.settings));
+/** Settings of a show that there are, each as it can be. */
+function known(settings: Record<string, number>, viewer: Viewer): Partial<Settings> {
+  const names = Object.keys(viewer.defaults) as (keyof Settings)[];
+  const given = names.filter((name) => Number.isFinite(settings[name]));
+  return Object.fromEntries(given.map((name) => [name, within(name, settings[name])]));
 }
 
 function build(viewer: Viewer): void {
@@ -49,6 +55,8 @@ function build(viewer: Viewer): void {
     makeTools(viewer),
     makePanel(viewer),
     element("footer", {}, makeStrip(viewer), makeTransport(viewer)),
+    makeRing(viewer),
+    makeHelp(),
   );
   listen(viewer);
   listenToKeys(viewer);

@@ -38,6 +38,24 @@ export function affineInverse(matrix: Matrix4): Matrix4 {
   return [...linear.map((row) => [...row, -turned(row, shift)]), [0, 0, 0, 1]];
 }
 
+/** Whether numbers of a file are a matrix that can be inverted. */
+export function isAffine(matrix: unknown): matrix is Matrix4 {
+  if (!Array.isArray(matrix) || matrix.length !== 4) return false;
+  const isSmall = (value: unknown): boolean => typeof value === "number" && Math.abs(value) < 1e30;
+  if (!matrix.every((row) => Array.isArray(row) && row.length === 4 && row.every(isSmall))) return false;
+  const isLast = [0, 0, 0, 1].every((value, column) => matrix[3][column] === value);
+  return isLast && affineInverse(matrix).flat().every((value) => Math.abs(value) < 1e30);
+}
+
+/** Whether numbers of a file are the corners of a box of cells. */
+export function isBox(box: unknown): box is [Vector, Vector] {
+  if (!Array.isArray(box) || box.length !== 2) return false;
+  const isCell = (value: unknown): boolean => Number.isInteger(value) && Math.abs(value as number) < 2 ** 30;
+  const [lower, upper] = box;
+  const areCells = box.every((corner) => Array.isArray(corner) && corner.length === 3 && corner.every(isCell));
+  return areCells && lower.every((low: number, axis: number) => low < upper[axis]);
+}
+
 export function plus(a: Vector, b: Vector, times = 1): Vector {
   return a.map((value, k) => value + times * b[k]);
 }

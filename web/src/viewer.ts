@@ -1,14 +1,15 @@
 // The loop: what is shown on the canvas, when, and how finely; and what a user can do with it.
 
-import type { Camera } from "./camera";
-import { Gpu } from "./gpu";
-import { pinholeMoved } from "./gestures";
-import { readModel, type Rule } from "./model";
-import { say, stop } from "./notice";
+import type { Camera } from "./picture/camera";
+import { Gpu } from "./gpu/gpu";
+import { pinholeMoved } from "./page/gestures";
+import { readModel, type Rule } from "./automaton/model";
+import { say, stop } from "./page/notice";
 import { oneLine, Problem } from "./problem";
-import { bytesOf, type Show } from "./show";
-import { Smoke } from "./smoke";
-import { DEFAULTS, type Settings, Stage } from "./stage";
+import { bytesOf, type Show } from "./page/show";
+import { Smoke } from "./smoke/smoke";
+import { DEFAULTS, type Settings } from "./settings";
+import { Stage } from "./stage";
 
 export type Tool = "orbit" | "erase" | "more" | "less";
 
@@ -232,7 +233,7 @@ export class Viewer extends EventTarget {
       say("Choose a second style to brush it on.");
       return;
     }
-    await this.exclusively(() => this.stage.touch(tool, [x - 0.5, 0.5 - y], this.aspect));
+    await this.exclusively(async () => this.stage.touch(tool, [x - 0.5, 0.5 - y], this.aspect));
     this.changed();
   }
 

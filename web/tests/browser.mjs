@@ -8,6 +8,7 @@ import { chromium } from "playwright-core";
 export const ROOT = join(dirname(fileURLToPath(import.meta.url)), "../..");
 export const MATERIAL = process.env.VNCA_MATERIAL ?? join(ROOT, "build/browser");
 const PYTHON = process.env.VNCA_PYTHON ?? join(ROOT, ".venv/bin/python");
+export const VNCA = join(dirname(PYTHON), "vnca");
 const PLACES = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 const FLAGS = [
   "--headless",

@@ -23,6 +23,7 @@ from vnca.recipe.sequence import (
     volumes,
 )
 from vnca.recipe.simulation import simulate
+from vnca.rule.conditioning import conditioning_named
 from vnca.rule.model import (
     CONFIG_NAME,
     MODEL_NAME,
@@ -175,6 +176,11 @@ def _shown(options: ViewRun, watch: Watch) -> _Shown:
     rules = _rules(given, options)
     asked = options.sequence or (None if given is None else _training_frame(options.model))
     if asked is None:
+        if smoke.fields:
+            raise OptionError(
+                f"`sequence`: a plume that is simulated has no {', '.join(smoke.fields)}, as "
+                f"{options.model or '`smoke.fields`'} asks for; name a sequence that has"
+            )
         watch.note("no sequence given: a plume is simulated")
         frames = [*simulate("plume", resolution=_RESOLUTION, frames=_FRAMES, watch=watch)]
         laid, region = region_of(frames)
@@ -208,7 +214,10 @@ def _given(options: ViewRun) -> tuple[Model | None, SmokeFormat]:
     model = load(options.model)
     recorded = recorded_smoke(Path(options.model), model)
     # What is asked for counts; what was recorded stands for what is not.
-    return model, recorded if recorded and options.smoke == SmokeFormat() else options.smoke
+    smoke = recorded if recorded and options.smoke == SmokeFormat() else options.smoke
+    told = model.rule.config.conditioning
+    needed = (name for name in told if conditioning_named(name).scale is not None)
+    return model, replace(smoke, fields=tuple(dict.fromkeys((*smoke.fields, *needed))))
 
 
 def _training_frame(model: str | None) -> str | None:

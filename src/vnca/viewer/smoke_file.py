@@ -7,20 +7,24 @@ the frames one after the other, each a zlib stream; all numbers are little-endia
 - `lattice_to_world`, `box`: where its cells lie, as in a model file;
 - `density`, `speed`: what the greatest byte of a density, and of a component of velocity, stands
   for; no speed where there is no velocity;
+- `fields`: what else there is at the cells, of each its `name`, its `width` in components, and its
+  `scale`, the greatest number in it; left out where there are none;
 - `frames`: of each its `number`, the `offset` of its stream from the end of the header, its
   `length` in bytes, and how many `bricks` it has.
 
 A stream has the coordinates of the bricks, counted from the brick that holds the lowest cell of the
 box, three unsigned 16-bit numbers each; then densities, 512 bytes a brick; then each component of
-velocity likewise. A density is density · (byte / 255)², a component of velocity, whose byte is
+velocity likewise; then each component of the fields, 512 signed 16-bit numbers a brick, of which
+32767 stands for the scale. A density is density · (byte / 255)², a component of velocity, whose byte is
 signed, speed · sign · (byte / 127)²: so thin smoke and slow motion keep their digits.
 """
 
 import json
+import math
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,9 +41,18 @@ from vnca.core.volume import Volume
 MAGIC = b"vncasmk1"
 MOST_BRICKS = 2**16
 """Along an axis of the box: what a coordinate holds."""
-_DENSITY_LEVELS, _SPEED_LEVELS = 255, 127
+_DENSITY_LEVELS, _SPEED_LEVELS, _FIELD_LEVELS = 255, 127, 32767
 _FAR = 1
-"""Cells from the smoke up to which velocity is kept; as far as a rule's cells are active."""
+"""Cells from the smoke up to which velocity and fields are kept, as cells of rules are active."""
+
+
+@dataclass(frozen=True)
+class NamedField:
+    """What else there is at the cells: its name, components, and the greatest number in it."""
+
+    name: str
+    width: int
+    scale: float
 
 
 @dataclass(frozen=True)
@@ -71,16 +84,12 @@ def write_smoke_file(
     lower, upper = (np.asarray(corner) for corner in region.box)
     if ((upper - lower) // EDGE + 2 > MOST_BRICKS).any():
         raise SequenceError(f"{name}: its box, {region.box}, is larger than a page can show")
-    density = speed = 0.0
-    for smoke in frames:
-        density = max(density, float(smoke.density_field.values.max(initial=0)))
-        if smoke.velocity_field is not None:
-            speed = max(speed, float(np.abs(smoke.velocity_field.values).max(initial=0)))
+    density, speed, fields = _scales(frames)
     if not density:
         raise SequenceError(f"{name}: there is no smoke in any frame")
     streams, listed, offset = [], [], 0
     for smoke in frames:
-        stream, bricks = _packed(smoke, region.box, density, speed)
+        stream, bricks = _packed(smoke, region.box, density, speed, fields)
         listed.append({"number": smoke.frame, "offset": offset, "length": len(stream)})
         listed[-1]["bricks"] = bricks
         streams.append(stream)
@@ -93,6 +102,7 @@ def write_smoke_file(
         "density": density,
         "speed": speed,
         "frames": listed,
+        **({"fields": [asdict(field) for field in fields]} if fields else {}),
     }
     written = json.dumps(header).encode()
     with whole_file(path) as temporary, temporary.open("wb") as file:
@@ -100,7 +110,24 @@ def write_smoke_file(
         file.writelines(streams)
 
 
-def _packed(smoke: Volume, box: Box, density: float, speed: float) -> tuple[bytes, int]:
+def _scales(frames: Iterable[Volume]) -> tuple[float, float, list[NamedField]]:
+    """The greatest density, component of velocity, and number of each field."""
+    density = speed = 0.0
+    fields: dict[str, NamedField] = {}
+    for smoke in frames:
+        density = max(density, float(smoke.density_field.values.max(initial=0)))
+        if smoke.velocity_field is not None:
+            speed = max(speed, float(np.abs(smoke.velocity_field.values).max(initial=0)))
+        for name, field in smoke.named_fields.items():
+            scale = float(np.abs(field.values).max(initial=0))
+            before = fields.get(name, NamedField(name, math.prod(field.values.shape[4:]), 0.0))
+            fields[name] = replace(before, scale=max(before.scale, scale))
+    return density, speed, list(fields.values())
+
+
+def _packed(
+    smoke: Volume, box: Box, density: float, speed: float, fields: Sequence[NamedField]
+) -> tuple[bytes, int]:
     """A frame's stream, and how many bricks are in it."""
     first = np.array(box.lower) // EDGE
     given = smoke.density_field
@@ -117,7 +144,20 @@ def _packed(smoke: Volume, box: Box, density: float, speed: float) -> tuple[byte
             steps = np.rint(_SPEED_LEVELS * np.sqrt(np.abs(values) / speed))
             moved = (np.sign(values) * steps).astype(np.int8)
         parts += [np.ascontiguousarray(moved[..., axis]).tobytes() for axis in range(3)]
+    for told in fields:
+        parts += _components(told, smoke.named_fields.get(told.name), near)
     return zlib.compress(b"".join(parts), 9), len(bricks)
+
+
+def _components(told: NamedField, field: Field | None, near: Field) -> Iterator[bytes]:
+    """Each component of a field near the smoke."""
+    count = len(near.bricks)
+    levels = np.zeros((count, EDGE, EDGE, EDGE, told.width), "<i2")
+    if field is not None and told.scale:
+        values = field.blocks(near.bricks).reshape(levels.shape) * near.values[..., None]
+        levels = np.rint(_FIELD_LEVELS / told.scale * values).astype("<i2")
+    for k in range(told.width):
+        yield np.ascontiguousarray(levels[..., k]).tobytes()
 
 
 class SmokeFile:
@@ -125,6 +165,7 @@ class SmokeFile:
 
     Attributes:
         header: As it is written.
+        fields: What there is beside density and velocity.
         frames: What is stored of each.
     """
 
@@ -142,6 +183,7 @@ class SmokeFile:
         try:
             self.header: dict[str, Any] = json.loads(data[12:end])
             self.frames = [Stored(**each) for each in self.header["frames"]]
+            self.fields = [NamedField(**each) for each in self.header.get("fields", [])]
         except (ValueError, TypeError, KeyError) as error:
             raise FileFormatError(f"{path}: damaged header ({error})") from error
         self._streams = data[end:]
@@ -157,7 +199,9 @@ class SmokeFile:
         box = Box((x, y, z), (u, v, w))
         for frame in self.frames:
             stream = self._streams[frame.offset : frame.offset + frame.length]
-            size = frame.bricks * (6 + CELLS * (4 if header["speed"] else 1))
+            components = sum(field.width for field in self.fields)
+            planes = 4 if header["speed"] else 1
+            size = frame.bricks * (6 + CELLS * (planes + 2 * components))
             try:
                 data = np.frombuffer(zlib.decompress(stream, bufsize=size), np.uint8)
             except zlib.error as error:
@@ -168,10 +212,12 @@ class SmokeFile:
 
     def _volume(self, frame: Stored, data: AnyArray, box: Box) -> Volume:
         count, header = frame.bricks, self.header
-        first = np.array(box.lower) // EDGE
-        bricks = data[: 6 * count].view("<u2").reshape(-1, 3).astype(np.int32) + first
+        lowest = np.array(box.lower) // EDGE
+        bricks = data[: 6 * count].view("<u2").reshape(-1, 3).astype(np.int32) + lowest
         bricks = bricks.astype(np.int32)
-        cells = data[6 * count :].reshape(-1, count, EDGE, EDGE, EDGE)
+        planes = 4 if header["speed"] else 1
+        end = count * (6 + planes * CELLS)
+        cells = data[6 * count : end].reshape(planes, count, EDGE, EDGE, EDGE)
         parts = np.square(cells[0].astype(np.float32) / np.float32(_DENSITY_LEVELS))
         density = Field(bricks, np.float32(header["density"]) * parts, box)
         motion = None
@@ -180,4 +226,12 @@ class SmokeFile:
             part = np.float32(header["speed"]) * part * np.abs(part)
             motion = Field(bricks, np.ascontiguousarray(part.transpose(1, 2, 3, 4, 0)), box)
         to_world = np.array(header["lattice_to_world"])
-        return Volume.of_fields(density, motion, to_world, frame.number)
+        levels = data[end:].view("<i2").reshape(-1, count, EDGE, EDGE, EDGE)
+        fields, first = {}, 0
+        for told in self.fields:
+            part = levels[first : first + told.width].astype(np.float32) / _FIELD_LEVELS
+            values = np.moveaxis(np.float32(told.scale) * part, 0, -1)
+            held = values[..., 0] if told.width == 1 else np.ascontiguousarray(values)
+            fields[told.name] = Field(bricks, held, box)
+            first += told.width
+        return Volume.of_fields(density, motion, to_world, frame.number, fields)

@@ -1,20 +1,19 @@
 // The state on the cells of another frame, carried there by its velocity: `painting/transport.py`.
 //
-// `sites` are those that it comes from. Places are counted from the cell, which keeps their digits.
+// `sites` are those that it comes from, and the batch those that want it: `wanted_place_at` tells where
+// they lie, `before_at` what there was. Places are counted from the cell, which keeps their digits.
 
 struct Wanted {
   map: u32,       // Of the cells that want a state: how many places their map has,
-  bricks: u32,    // how many bricks hold them,
-  cells: u32,     // and how many there are.
+  bricks: u32,    // and how many bricks hold them.
+  unused: u32,
   frames: f32,    // For how long the velocity carries it; below zero back, 0 not at all.
   guide: vec4f,   // As the rule is told.
   speed: f32,     // That counts as 1.
 }
 
 @group(1) @binding(0) var<uniform> wanted: Wanted;
-@group(1) @binding(1) var<storage, read> wanted_places: array<u32>;
-@group(1) @binding(2) var<storage, read> before: array<vec4f>;
-@group(1) @binding(3) var<storage, read_write> after: array<vec4f>;
+@group(1) @binding(3) var<storage, read_write> after: array<vec4f>;  // Of the batch.
 
 // What must be active upstream of a cell for it to have its state from there.
 const LEAST_SHARE = 0.25;
@@ -23,9 +22,9 @@ const LEAST_KNOWN = 1e-6;
 const FARTHEST = 1048576.0;
 
 fn wanted_cell(row: u32) -> vec3i {
-  let at = wanted_places[wanted.map + 515u * wanted.bricks + row];
+  let at = wanted_place_at(wanted.map + 515u * wanted.bricks + row);
   let brick = wanted.map + 3u * (at >> 9);
-  let corner = vec3u(wanted_places[brick], wanted_places[brick + 1u], wanted_places[brick + 2u]);
+  let corner = vec3u(wanted_place_at(brick), wanted_place_at(brick + 1u), wanted_place_at(brick + 2u));
   return vec3i(corner) * 8 + vec3i(vec3u((at >> 6) & 7u, (at >> 3) & 7u, at & 7u));
 }
 
@@ -67,11 +66,11 @@ fn moved(cell: vec3i) -> vec3f {
 fn carry(
   @builtin(global_invocation_id) thread: vec3u, @builtin(num_workgroups) groups: vec3u
 ) {
-  let row = thread.y * groups.x * 64u + thread.x;
-  if (row >= wanted.cells) {
+  let number = thread.y * groups.x * 64u + thread.x;
+  if (number >= batch.rows) {
     return;
   }
-  let cell = wanted_cell(row);
+  let cell = wanted_cell(batch.first + number);
   let upstream = clamp(-moved(cell), vec3f(-FARTHEST), vec3f(FARTHEST));
   let first = floor(upstream);
   var rows: array<u32, 8>;
@@ -92,9 +91,9 @@ fn carry(
     var value = vec4f(0.0);
     for (var corner = 0u; corner < 8u; corner++) {
       if (shares[corner] > 0.0) {
-        value += (shares[corner] / total) * before[rows[corner] * PLANES + p];
+        value += (shares[corner] / total) * before_at(rows[corner], p);
       }
     }
-    after[row * PLANES + p] = value;
+    after[number * PLANES + p] = value;
   }
 }

@@ -1,4 +1,5 @@
-// What the cells of a rule are conditioned on: position, density, velocity, as `rule/conditioning.py`.
+// What the cells of a rule are conditioned on: position, density, velocity, as `rule/conditioning.py`;
+// and `tell_fields` adds fields of the smoke.
 
 struct Condition {
   place: mat4x4f,   // From index coordinates to −1 … 1 in the box of the training.
@@ -10,7 +11,7 @@ struct Condition {
 }
 
 @group(1) @binding(0) var<uniform> given: Condition;
-@group(1) @binding(1) var<storage, read_write> told: array<f32>;
+@group(1) @binding(1) var<storage, read_write> told: array<f32>;  // Of the batch.
 
 const SPEED_LIMIT = 2.0;
 const DENSITY_LIMIT = 4.0;
@@ -19,12 +20,12 @@ const DENSITY_LIMIT = 4.0;
 fn condition(
   @builtin(global_invocation_id) thread: vec3u, @builtin(num_workgroups) groups: vec3u
 ) {
-  let row = thread.y * groups.x * 64u + thread.x;
-  if (row >= sites.cells) {
+  let number = thread.y * groups.x * 64u + thread.x;
+  if (number >= batch.rows) {
     return;
   }
-  let cell = cell_of(row);
-  let first = row * given.width;
+  let cell = cell_of(batch.first + number);
+  let first = number * given.width;
   for (var k = 0u; k + 1u < given.width; k++) {
     told[first + k] = 0.0;
   }
@@ -46,4 +47,5 @@ fn condition(
       told[first + u32(given.columns.z) + axis] = limited[axis];
     }
   }
+  tell_fields(first, cell);
 }

@@ -52,7 +52,7 @@ fn is_stored(brick: vec3i) -> bool {
   if (any(at < vec3i(0)) || any(at >= smoke.span)) {
     return false;
   }
-  return bytes[u32((at.x * smoke.span.y + at.y) * smoke.span.z + at.z)] != NONE;
+  return word_at(u32((at.x * smoke.span.y + at.y) * smoke.span.z + at.z)) != NONE;
 }
 
 // The depth at which a ray leaves a brick.

@@ -9,10 +9,10 @@ struct Paint {
 }
 
 @group(2) @binding(0) var<uniform> now: Paint;
-@group(2) @binding(1) var<storage, read> state: array<vec4f>;
-// By row and part: linear colour, and the factor of density. Of the rim, rows that follow the active
-// ones: minus the layer in which its colour was found, or 0.
-@group(2) @binding(2) var<storage, read_write> painted: array<vec4f>;
+
+// `state_at` reads the states. `painted_at` and `set_painted` are by row and part: linear colour, and
+// the factor of density. Of the rim, rows that follow the active ones: minus the layer in which its
+// colour was found, or 0.
 
 fn linear_of(colour: vec3f) -> vec3f {
   let shown = clamp(colour + 0.5, vec3f(0.0), vec3f(1.0));
@@ -36,7 +36,7 @@ fn seen_at(cell: vec3i, twice: vec3i, along: i32) -> vec4f {
     }
     let share = select(1.0 - fraction, fraction, step == vec3i(1));
     for (var p = 0u; p < PLANES; p++) {
-      between[p] += share.x * share.y * share.z * state[row * PLANES + p];
+      between[p] += share.x * share.y * share.z * state_at(row, p);
     }
   }
   return seen_of(between);
@@ -61,13 +61,13 @@ fn paint(
     let sample = vec3u(s / (now.samples * now.samples), (s / now.samples) % now.samples, s % now.samples);
     var seen: vec4f;
     if (UNITS4 == 0u) {
-      seen = state[row * PLANES];
+      seen = state_at(row, 0u);
     } else {
       seen = seen_at(cell, 2 * vec3i(part * now.samples + sample) + 1 - along, along);
     }
     sum += vec4f(linear_of(seen.xyz), 1.0 + clamp(seen.w, -0.5, 0.5));
   }
-  painted[number] = sum / f32(count);
+  set_painted(row, number % parts, sum / f32(count));
 }
 
 // A layer of the rim: the mean of those of the six parts beside each that were known a layer before.
@@ -81,16 +81,16 @@ fn rim(
     return;
   }
   let row = sites.cells + number / parts;
-  let at = row * parts + number % parts;
+  let own = number % parts;
   if (now.layer == 0u) {
-    painted[at] = vec4f(1.0, 1.0, 1.0, 0.0);
+    set_painted(row, own, vec4f(1.0, 1.0, 1.0, 0.0));
     return;
   }
-  if (painted[at].w != 0.0) {
+  if (painted_at(row, own).w != 0.0) {
     return;
   }
   let size = i32(now.parts);
-  let fine = cell_of(row) * size + vec3i(part_of(number % parts));
+  let fine = cell_of(row) * size + vec3i(part_of(own));
   var sum = vec4f(0.0);
   for (var way = 0u; way < 6u; way++) {
     var beside = fine;
@@ -102,13 +102,13 @@ fn rim(
       continue;
     }
     let inside = vec3u(beside - coarse * size);
-    let colour = painted[there * parts + (inside.x * now.parts + inside.y) * now.parts + inside.z];
+    let colour = painted_at(there, (inside.x * now.parts + inside.y) * now.parts + inside.z);
     let known = -colour.w;
     if (known < 0.0 || (known > 0.0 && known < f32(now.layer))) {
       sum += vec4f(colour.xyz, 1.0);
     }
   }
   if (sum.w > 0.0) {
-    painted[at] = vec4f(sum.xyz / sum.w, -f32(now.layer));
+    set_painted(row, own, vec4f(sum.xyz / sum.w, -f32(now.layer)));
   }
 }

@@ -11,9 +11,9 @@ struct Smoke {
   unused: u32,
 }
 
-// The map, the number of a brick or NONE; then the densities, 128 words a brick; then the velocities.
+// `word_at` reads the map, the number of a brick or NONE; then the densities, 128 words a brick; then
+// the velocities; then the fields, 256 words a brick and component.
 @group(2) @binding(0) var<uniform> smoke: Smoke;
-@group(2) @binding(1) var<storage, read> bytes: array<u32>;
 
 const NONE = 0xffffffffu;
 
@@ -23,14 +23,14 @@ fn stored_at(cell: vec3i) -> u32 {
   if (any(at < vec3i(0)) || any(at >= smoke.span)) {
     return NONE;
   }
-  let brick = bytes[u32((at.x * smoke.span.y + at.y) * smoke.span.z + at.z)];
+  let brick = word_at(u32((at.x * smoke.span.y + at.y) * smoke.span.z + at.z));
   let within = vec3u(cell & vec3i(7));
   return select(512u * brick + ((within.x << 6) | (within.y << 3) | within.z), NONE, brick == NONE);
 }
 
 fn byte_of(plane: u32, stored: u32) -> u32 {
   let map = u32(smoke.span.x * smoke.span.y * smoke.span.z);
-  let word = bytes[map + 128u * plane * smoke.bricks + stored / 4u];
+  let word = word_at(map + 128u * plane * smoke.bricks + stored / 4u);
   return (word >> (8u * (stored & 3u))) & 255u;
 }
 
@@ -54,6 +54,18 @@ fn velocity_at(cell: vec3i) -> vec3f {
     parts[axis] = f32(byte) / 127.0;
   }
   return smoke.speed * parts * abs(parts);
+}
+
+// A component of the fields, −1 … 1.
+fn field_at(component: u32, cell: vec3i) -> f32 {
+  let stored = stored_at(cell);
+  if (stored == NONE) {
+    return 0.0;
+  }
+  let planes = select(1u, 4u, smoke.speed > 0.0);
+  let before = u32(smoke.span.x * smoke.span.y * smoke.span.z) + 128u * planes * smoke.bricks;
+  let word = word_at(before + 256u * component * smoke.bricks + stored / 2u);
+  return f32(i32(word << (16u * (1u - (stored & 1u)))) >> 16u) / 32767.0;
 }
 
 // A velocity turned towards a direction by a part; one that rests, as if it had half of `unit`.

@@ -1,4 +1,6 @@
 // What is drawn: density, and colour times density, at every cell of the box and one beside it.
+//
+// `painted_at` reads what a rule has painted, `brushed_at` how much more of it is seen at a cell.
 
 struct Volume {
   parts: i32,              // Of a cell along each axis.
@@ -12,8 +14,6 @@ struct Volume {
 }
 
 @group(1) @binding(0) var<uniform> look: Volume;
-@group(1) @binding(1) var<storage, read> painted: array<vec4f>;
-@group(1) @binding(2) var<storage, read> brushed: array<f32>;   // and how much more where, by cell.
 @group(1) @binding(3) var under: texture_3d<f32>;
 @group(1) @binding(4) var drawn: texture_storage_3d<rgba16float, write>;
 
@@ -51,9 +51,8 @@ fn volume(@builtin(global_invocation_id) thread: vec3u) {
       let row = row_of(coarse);
       if (row != NOWHERE && look.is_plain == 0u) {
         let inside = fine - coarse * look.parts;
-        let parts = u32(look.parts * look.parts * look.parts);
         let part = u32((inside.x * look.parts + inside.y) * look.parts + inside.z);
-        colour = painted[row * parts + part];
+        colour = painted_at(row, part);
         colour.w = select(1.0, colour.w, row < sites.cells);
       }
       let shown = 1.0 + look.strength * (colour.xyz - 1.0);
@@ -63,7 +62,7 @@ fn volume(@builtin(global_invocation_id) thread: vec3u) {
     if (look.has_under == 1u) {
       let at = coarse - smoke.lower;
       let side = smoke.upper - smoke.lower;
-      let more = brushed[u32((at.x * side.y + at.y) * side.z + at.z)];
+      let more = brushed_at(u32(at.x), u32(at.y * side.z + at.z));
       value = mix(textureLoad(under, thread, 0), value, clamp(look.mixed + more, 0.0, 1.0));
     }
   }

@@ -57,6 +57,12 @@ def name() -> str:
     return str(_adapter().info["device"])
 
 
+def binding_bytes() -> int:
+    """How many bytes of an array a shader binds at once."""
+    limits = device().limits
+    return min(limits["max-storage-buffer-binding-size"], limits["max-buffer-size"])
+
+
 def source(*parts: str, **constants: int) -> str:
     """A shader of some files of this folder, one after the other, below its constants."""
     folder = files("vnca.engine.wgsl")
@@ -103,7 +109,7 @@ class Buffer:
         """
         import wgpu
 
-        most = device().limits["max-storage-buffer-binding-size"]
+        most = binding_bytes()
         if size > most:
             raise OutOfMemoryError(
                 f"backend wgsl: an array of {size / 2**20:.0f} MiB, and {name()} binds at most "

@@ -1,4 +1,5 @@
-// What is seen at points given by the rows of the cells around them, as arrays are decoded.
+// What is seen at points given by the rows of the cells around them, as arrays are decoded: `state_at`
+// reads the states.
 
 struct Points {
   count: u32,       // How many points there are,
@@ -9,8 +10,7 @@ struct Points {
 @group(0) @binding(0) var<uniform> points: Points;
 @group(0) @binding(1) var<storage, read> rows: array<u32>;        // By corner, z fastest, then point.
 @group(0) @binding(2) var<storage, read> fractions: array<f32>;   // By point.
-@group(0) @binding(3) var<storage, read> state: array<vec4f>;
-@group(0) @binding(4) var<storage, read_write> seen: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> seen: array<vec4f>;
 
 @compute @workgroup_size(64)
 fn decode(
@@ -30,7 +30,7 @@ fn decode(
     let upper = vec3u((corner >> 2u) & 1u, (corner >> 1u) & 1u, corner & 1u) == vec3u(1u);
     let share = select(1.0 - part, part, upper);
     for (var p = 0u; p < PLANES; p++) {
-      between[p] += share.x * share.y * share.z * state[row * PLANES + p];
+      between[p] += share.x * share.y * share.z * state_at(row, p);
     }
   }
   seen[point] = seen_of(between);

@@ -12,9 +12,12 @@ from vnca.engine import Job, Session
 from vnca.engine.automaton import FILTERS, Automaton, Weights, mask_key, mask_threshold
 from vnca.engine.domain import Domain
 from vnca.engine.wgsl.device import Buffer, bound, dispatched, pipeline, source
+from vnca.engine.wgsl.parts import Layout, Rows, require_bindings
 
 CELLS_OF_GROUP = 256
 """Cells whose mask a group of threads draws, as `step.wgsl` has it."""
+PLACES, STATE = 16, 512
+"""The first bindings of the list of cells, and of their states."""
 NOWHERE = 0xFFFFFFFF
 MOST_PLACES = 2**25
 """Bricks that the map may span: some thousands of cells along each axis."""
@@ -28,12 +31,16 @@ class WgslSession(Session):
         automaton: Its mask.
         cells: How many cells are active.
         ready: The pipeline.
-        fixed: Its bindings, but those of the states and of the step.
+        told: What the cells are conditioned on, in the parts in which their states are.
+        parts: Of each of them the first row, and how many cells there are.
+        fixed: The bindings of all else but the states and the step.
     """
 
     automaton: Automaton
     cells: int
     ready: Any
+    told: Rows
+    parts: tuple[Buffer, ...]
     fixed: dict[int, Buffer]
 
     @classmethod
@@ -41,49 +48,60 @@ class WgslSession(Session):
         """Bring everything to the device."""
         automaton, half = job.automaton, job.compute.precision == "float16"
         channels, hidden = automaton.weights.output.shape
+        cells, planes = len(job.domain), quarters(channels)
         told = _told(np.asarray(job.conditioning))
-        planes = quarters(channels)
-        code = source("sites", "step", planes=planes, told=told.shape[1] // 4, hidden=hidden)
+        wide = told.shape[1]
+        states = Layout.of(cells + 1, 16 * planes, beside=4 * wide)
+        sites, listed = _sites(job.domain)
+        places = Rows.of(listed)
+        # Beside them: weights, what the cells are told, and the states that follow.
+        require_bindings(places.layout.parts + states.parts + 3)
+        reading = places.layout.declared("place", "u32", PLACES)
+        reading += states.declared("state", "vec4f", STATE, width="PLANES")
+        code = source("sites", "step", planes=planes, told=wide // 4, hidden=hidden)
         factor = "enable f16;\nalias Factor = f16;\n" if half else "alias Factor = f32;\n"
-        sites, places = _sites(job.domain)
-        weights = packed(automaton.weights, channels, told.shape[1])
+        weights = packed(automaton.weights, channels, wide)
+        each = states.each
+        spans = (np.array([at, min(each, cells - at)], np.uint32) for at in range(0, cells, each))
         return cls(
             automaton,
-            len(job.domain),
-            pipeline(factor + code, "step"),
+            cells,
+            pipeline(factor + reading + code, "step"),
+            Rows.of(told, each),
+            tuple(Buffer.of(span, uniform=True) for span in spans),
             {
                 0: Buffer.of(sites, uniform=True),
-                1: Buffer.of(places),
                 3: Buffer.of(_filters(automaton.stencil), uniform=True),
                 4: Buffer.of(weights.astype(np.float16 if half else np.float32)),
-                5: Buffer.of(told),
+                **places.bindings(PLACES),
             },
         )
 
     def conditioned(self, conditioning: Any) -> "WgslSession":
         """See `Session.conditioned`."""
-        told = Buffer.of(_told(np.asarray(conditioning)))
-        return replace(self, fixed={**self.fixed, 5: told})
+        return replace(self, told=Rows.of(_told(np.asarray(conditioning)), self.told.layout.each))
 
-    def upload(self, state: FloatArray) -> Buffer:
+    def upload(self, state: FloatArray) -> Rows:
         """See `Session.upload`."""
-        return Buffer.of(widened(state))
+        return Rows.of(widened(state), self.told.layout.each)
 
-    def step(self, state: Buffer, number: int) -> Buffer:
+    def step(self, state: Rows, number: int) -> Rows:
         """See `Session.step`."""
         automaton = self.automaton
         probability = automaton.update_probability
         always = probability >= 1
         threshold = 0 if always else mask_threshold(probability)
         now = np.array([mask_key(automaton.seed, number), threshold, always, 0], np.uint32)
-        following = Buffer.empty(state.size)
-        bindings = {**self.fixed, 2: Buffer.of(now, uniform=True), 6: state, 7: following}
-        if self.cells:
-            groups = [bound(self.ready, bindings)]
-            dispatched(self.ready, groups, -(-self.cells // CELLS_OF_GROUP))
+        following = state.blank()
+        shared = {2: Buffer.of(now, uniform=True), **self.fixed, **state.bindings(STATE)}
+        groups = -(-min(self.told.layout.each, self.cells) // CELLS_OF_GROUP)
+        # The last part may hold nothing but the row that is always zero.
+        for at, part in enumerate(self.parts):
+            own = {1: part, 5: self.told.buffers[at], 6: following.buffers[at]}
+            dispatched(self.ready, [bound(self.ready, {**shared, **own})], groups)
         return following
 
-    def read(self, state: Buffer) -> FloatArray:
+    def read(self, state: Rows) -> FloatArray:
         """See `Session.read`."""
         channels = len(self.automaton.weights.output)
         values = state.read(np.float32).reshape(self.cells + 1, -1)

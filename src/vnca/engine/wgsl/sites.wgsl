@@ -16,13 +16,19 @@ struct Sites {
 
 const NOWHERE = 0xffffffffu;
 
+// What a thread works on: so many rows from the first on.
+struct Batch {
+  first: u32,
+  rows: u32,
+}
+
 // Rows from `cells` on belong to cells beside the active ones, which have a place and no state.
 //
-// Behind each other: the map, a number of a brick or NOWHERE for each of its places, z fastest; the
+// `place_at` reads, behind each other: the map, a number of a brick or NOWHERE for each of its places, z fastest; the
 // coordinates of the bricks, three each; the rows of their cells, 512 each; and where the cell of
 // each row lies, number of brick · 512 + place in it.
 @group(0) @binding(0) var<uniform> sites: Sites;
-@group(0) @binding(1) var<storage, read> places: array<u32>;
+@group(0) @binding(1) var<uniform> batch: Batch;
 
 fn map_length() -> u32 {
   return u32(sites.span.x * sites.span.y * sites.span.z);
@@ -34,7 +40,7 @@ fn brick_at(cell: vec3i) -> u32 {
   if (any(at < vec3i(0)) || any(at >= sites.span)) {
     return NOWHERE;
   }
-  return places[u32((at.x * sites.span.y + at.y) * sites.span.z + at.z)];
+  return place_at(u32((at.x * sites.span.y + at.y) * sites.span.z + at.z));
 }
 
 fn place_in_brick(cell: vec3i) -> u32 {
@@ -48,7 +54,7 @@ fn row_of(cell: vec3i) -> u32 {
   if (brick == NOWHERE) {
     return NOWHERE;
   }
-  return places[map_length() + 3u * sites.bricks + 512u * brick + place_in_brick(cell)];
+  return place_at(map_length() + 3u * sites.bricks + 512u * brick + place_in_brick(cell));
 }
 
 // The cell that stands for a place at most a box beside the box.
@@ -61,8 +67,8 @@ fn bordered(cell: vec3i) -> vec3i {
 }
 
 fn cell_of(row: u32) -> vec3i {
-  let at = places[map_length() + 515u * sites.bricks + row];
+  let at = place_at(map_length() + 515u * sites.bricks + row);
   let brick = map_length() + 3u * (at >> 9);
-  let corner = vec3i(vec3u(places[brick], places[brick + 1u], places[brick + 2u]));
+  let corner = vec3i(vec3u(place_at(brick), place_at(brick + 1u), place_at(brick + 2u)));
   return corner * 8 + vec3i(vec3u((at >> 6) & 7u, (at >> 3) & 7u, at & 7u));
 }

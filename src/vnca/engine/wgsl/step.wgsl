@@ -2,7 +2,8 @@
 //
 // A row of the state is PLANES vectors of four channels; of what cells are told, TOLD vectors, whose
 // last number is the 1. A group of threads draws the mask for some cells and then shares those that
-// change among its threads: the others cost nothing but a copy.
+// change among its threads: the others cost nothing but a copy. `state_at` reads the states of all
+// cells; `told` and `next` are those of the batch.
 
 struct Step {
   key: u32,         // What hashes are combined with in this step.
@@ -21,8 +22,7 @@ const OF_UNIT = INPUTS + PLANES;
 @group(0) @binding(3) var<uniform> stencil: array<vec4f, 54>;  // By neighbour: four filters; the fifth.
 @group(0) @binding(4) var<storage, read> weights: array<vec4<Factor>>;  // By unit: of W1, of W2.
 @group(0) @binding(5) var<storage, read> told: array<vec4f>;
-@group(0) @binding(6) var<storage, read> state: array<vec4f>;
-@group(0) @binding(7) var<storage, read_write> next: array<vec4f>;
+@group(0) @binding(6) var<storage, read_write> next: array<vec4f>;
 
 var<workgroup> changing: array<u32, CELLS_OF_GROUP>;
 var<workgroup> found: atomic<u32>;
@@ -60,7 +60,7 @@ fn update(row: u32) {
     let four = stencil[2u * k];
     let fifth = stencil[2u * k + 1u].x;
     for (var p = 0u; p < PLANES; p++) {
-      let seen = state[beside * PLANES + p];
+      let seen = state_at(beside, p);
       perceived[p] += four.x * seen;
       perceived[PLANES + p] += four.y * seen;
       perceived[2u * PLANES + p] += four.z * seen;
@@ -72,7 +72,7 @@ fn update(row: u32) {
     inputs[i] = vec4<Factor>(perceived[i]);
   }
   for (var i = 0u; i < TOLD; i++) {
-    inputs[FILTERS * PLANES + i] = vec4<Factor>(told[row * TOLD + i]);
+    inputs[FILTERS * PLANES + i] = vec4<Factor>(told[(row - batch.first) * TOLD + i]);
   }
   var change: array<vec4f, PLANES>;
   for (var unit = 0u; unit < HIDDEN; unit++) {
@@ -89,7 +89,7 @@ fn update(row: u32) {
     }
   }
   for (var p = 0u; p < PLANES; p++) {
-    next[row * PLANES + p] = state[row * PLANES + p] + change[p];
+    next[(row - batch.first) * PLANES + p] = state_at(row, p) + change[p];
   }
 }
 
@@ -106,15 +106,15 @@ fn step(
   workgroupBarrier();
   let first = (group.y * groups.x + group.x) * CELLS_OF_GROUP;
   for (var at = thread; at < CELLS_OF_GROUP; at += THREADS) {
-    let row = first + at;
-    if (row >= sites.cells) {
+    if (first + at >= batch.rows) {
       continue;
     }
+    let row = batch.first + first + at;
     if (changes(row)) {
       changing[atomicAdd(&found, 1u)] = row;
     } else {
       for (var p = 0u; p < PLANES; p++) {
-        next[row * PLANES + p] = state[row * PLANES + p];
+        next[(row - batch.first) * PLANES + p] = state_at(row, p);
       }
     }
   }

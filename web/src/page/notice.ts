@@ -1,7 +1,7 @@
 // What the page has to say: a line that passes, or a page of its own where nothing can be shown.
 
 import { element } from "./dom";
-import { oneLine } from "./problem";
+import { oneLine } from "../problem";
 
 const SHOWN = 6000; // ms
 let leaving = 0;

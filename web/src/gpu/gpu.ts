@@ -1,11 +1,12 @@
 // The GPU: opened with what the adapter has, and shaders made ready to run on it.
 
-import { Problem } from "./problem";
+import { Problem } from "../problem";
 
 /** What is asked for as large as the adapter has it. */
 const LIMITS = [
   "maxBufferSize",
   "maxStorageBufferBindingSize",
+  "maxStorageBuffersPerShaderStage",
   "maxTextureDimension3D",
   "maxTextureDimension2D",
 ] as const;
@@ -17,7 +18,8 @@ export type Bindings = Record<number, Resource>;
 export class Gpu {
   readonly lost: Promise<GPUDeviceLostInfo>;
   private readonly modules = new Map<string, GPUShaderModule>();
-  private readonly pipelines = new Map<string, Promise<GPUComputePipeline>>();
+  private readonly pipelines = new Map<string, GPUComputePipeline>();
+  private readonly drawings = new Map<string, GPURenderPipeline>();
 
   private constructor(
     readonly device: GPUDevice,
@@ -46,13 +48,26 @@ export class Gpu {
     return new Gpu(device, description || `${vendor} ${architecture}`.trim() || "a GPU", hasHalf);
   }
 
+  /** How many bytes of an array a shader binds at once. */
+  get bindable(): number {
+    const { maxStorageBufferBindingSize, maxBufferSize } = this.device.limits;
+    return Math.min(maxStorageBufferBindingSize, maxBufferSize);
+  }
+
+  /** Refuses what takes more arrays at once than a shader binds. */
+  requireBindings(count: number, what: string): void {
+    const most = this.device.limits.maxStorageBuffersPerShaderStage;
+    if (count <= most) return;
+    throw new Problem(
+      `${what}: arrays in ${count} parts of ${mebibytes(this.bindable)}, and this GPU binds at most ` +
+        `${most}: choose a smaller sequence or less detail.`,
+    );
+  }
+
   /** So many bytes of zeros, or an array; what cannot be bound is refused. */
   buffer(content: number | ArrayBufferView<ArrayBuffer>, what: string, usage = 0): GPUBuffer {
     const size = typeof content === "number" ? content : content.byteLength;
-    const most = Math.min(
-      this.device.limits.maxStorageBufferBindingSize,
-      this.device.limits.maxBufferSize,
-    );
+    const most = this.bindable;
     if (size > most) {
       throw new Problem(
         `${what} takes ${mebibytes(size)}, and this GPU binds at most ${mebibytes(most)}: ` +
@@ -85,24 +100,56 @@ export class Gpu {
     return module;
   }
 
-  compute(code: string, entryPoint: string): Promise<GPUComputePipeline> {
+  /** Shaders made ready beforehand, so that nothing waits for them later. */
+  async prepare(shaders: [code: string, entryPoint: string][]): Promise<void> {
+    await Promise.all(
+      shaders.map(async ([code, entryPoint]) => {
+        const compute = { module: this.module(code), entryPoint };
+        const ready = await this.device.createComputePipelineAsync({ layout: "auto", compute });
+        this.pipelines.set(`${entryPoint}\n${code}`, ready);
+      }),
+    );
+  }
+
+  /** A shader ready to run. */
+  compute(code: string, entryPoint: string): GPUComputePipeline {
     const key = `${entryPoint}\n${code}`;
     let ready = this.pipelines.get(key);
     if (ready === undefined) {
       const compute = { module: this.module(code), entryPoint };
-      ready = this.device.createComputePipelineAsync({ layout: "auto", compute });
+      ready = this.device.createComputePipeline({ layout: "auto", compute });
       this.pipelines.set(key, ready);
     }
     return ready;
   }
 
-  render(code: string, fragment: string, format: GPUTextureFormat): Promise<GPURenderPipeline> {
+  /** Likewise of what draws, from the vertices of `corner`. */
+  async prepareRender(code: string, fragment: string, format: GPUTextureFormat): Promise<void> {
+    const ready = await this.device.createRenderPipelineAsync(this.drawing(code, fragment, format));
+    this.drawings.set(`${fragment} ${format}\n${code}`, ready);
+  }
+
+  render(code: string, fragment: string, format: GPUTextureFormat): GPURenderPipeline {
+    const key = `${fragment} ${format}\n${code}`;
+    let ready = this.drawings.get(key);
+    if (ready === undefined) {
+      ready = this.device.createRenderPipeline(this.drawing(code, fragment, format));
+      this.drawings.set(key, ready);
+    }
+    return ready;
+  }
+
+  private drawing(
+    code: string,
+    entryPoint: string,
+    format: GPUTextureFormat,
+  ): GPURenderPipelineDescriptor {
     const module = this.module(code);
-    return this.device.createRenderPipelineAsync({
+    return {
       layout: "auto",
       vertex: { module, entryPoint: "corner" },
-      fragment: { module, entryPoint: fragment, targets: [{ format }] },
-    });
+      fragment: { module, entryPoint, targets: [{ format }] },
+    };
   }
 
   bound(ready: GPUPipelineBase, group: number, bindings: Bindings): GPUBindGroup {

@@ -1,16 +1,17 @@
 // From what layers have painted to a picture: the volume that is drawn, the light in it, the rays.
 
-import lightCode from "./shaders/light.wgsl";
-import marchCode from "./shaders/march.wgsl";
-import smokeCode from "./shaders/smoke.wgsl";
-import volumeCode from "./shaders/volume.wgsl";
-import sitesCode from "../../src/vnca/engine/wgsl/sites.wgsl";
+import lightCode from "../shaders/light.wgsl";
+import marchCode from "../shaders/march.wgsl";
+import volumeCode from "../shaders/volume.wgsl";
 import { type Camera, pinhole, slope, viewAxes } from "./camera";
-import { type Gpu, mebibytes, run } from "./gpu";
-import type { FrameBuffers, Layer } from "./layer";
-import { affineInverse, applied, rotated, scaled, type Matrix4, type Vector } from "./matrix";
-import { Problem } from "./problem";
-import type { Smoke } from "./smoke";
+import { type Gpu, mebibytes, run } from "../gpu/gpu";
+import { type FrameBuffers, smokeShader } from "../smoke/frame";
+import type { Layer } from "../automaton/layer";
+import { affineInverse, applied, rotated, scaled, type Matrix4, type Vector } from "../matrix";
+import { Problem } from "../problem";
+import { Layout, type Rows } from "../gpu/rows";
+import { PLACES, sitesShader } from "../automaton/sites";
+import type { Smoke } from "../smoke/smoke";
 
 /** Blocks of the light along the longest side: shadows are soft. */
 const FINEST = 96;
@@ -43,11 +44,27 @@ export interface Look {
   mixed: number;
 }
 
-interface Pipelines {
-  volume: GPUComputePipeline;
-  gather: GPUComputePipeline;
-  sweep: GPUComputePipeline;
-  march: GPURenderPipeline;
+/** Bindings of what is drawn: what a rule has painted, and where more of it is seen. */
+const PAINTED = {
+  group: 1,
+  first: 16,
+  element: "vec4f",
+  width: "u32(look.parts * look.parts * look.parts)",
+};
+export const BRUSHED = {
+  group: 1,
+  first: 512,
+  element: "f32",
+  width: "u32((smoke.upper.y - smoke.lower.y) * (smoke.upper.z - smoke.lower.z))",
+};
+
+function volumeShader(places: Layout, painted: Layout, brushed: Layout, words: Layout): string {
+  const arrays = `${painted.declared("painted", PAINTED)}${brushed.declared("brushed", BRUSHED)}`;
+  return `${sitesShader(places)}${smokeShader(words)}${arrays}${volumeCode}`;
+}
+
+function marchShader(words: Layout): string {
+  return `${smokeShader(words)}${marchCode}`;
 }
 
 export class Picture {
@@ -68,7 +85,6 @@ export class Picture {
   private constructor(
     private readonly gpu: Gpu,
     private readonly smoke: Smoke,
-    private readonly pipelines: Pipelines,
   ) {
     this.looks = [0, 1].map(() => gpu.uniform(32));
     this.camera = gpu.uniform(128);
@@ -77,30 +93,23 @@ export class Picture {
   }
 
   static async create(gpu: Gpu, smoke: Smoke): Promise<Picture> {
-    const [volume, gather, sweep, march] = await Promise.all([
-      gpu.compute(`${sitesCode}${smokeCode}${volumeCode}`, "volume"),
-      gpu.compute(lightCode, "gather"),
-      gpu.compute(lightCode, "sweep"),
-      gpu.render(`${smokeCode}${marchCode}`, "march", PICTURE),
+    const { WHOLE } = Layout;
+    await Promise.all([
+      gpu.prepare([
+        [volumeShader(WHOLE, WHOLE, WHOLE, WHOLE), "volume"],
+        [lightCode, "gather"],
+        [lightCode, "sweep"],
+      ]),
+      gpu.prepareRender(marchShader(WHOLE), "march", PICTURE),
     ]);
-    return new Picture(gpu, smoke, { volume, gather, sweep, march });
+    return new Picture(gpu, smoke);
   }
 
   /** Draw on a grid so many times as fine as that of the smoke. */
   refine(parts: number): void {
     if (parts === this.parts) return;
     this.release();
-    const { lower, upper } = this.smoke;
-    this.size = lower.map((low, axis) => (upper[axis] - low) * parts + 2);
-    const most = this.gpu.device.limits.maxTextureDimension3D;
-    const texels = this.size.reduce((product, side) => product * side, 1);
-    if (Math.max(...this.size) > most || texels > MOST_TEXELS) {
-      const sides = this.size.join(" × ");
-      throw new Problem(
-        `A volume of ${sides} (${mebibytes(8 * texels)}) is more than this page draws: choose a ` +
-          "smaller sequence or less detail.",
-      );
-    }
+    this.size = drawnSize(this.gpu, this.smoke, parts);
     this.parts = parts;
     this.textures = [0, 1].map(() => this.texture(this.size));
     this.makeBlocks();
@@ -135,7 +144,7 @@ export class Picture {
   }
 
   /** What is there, of one rule or of a second mixed over it, and how light reaches it. */
-  draw(buffers: FrameBuffers, layers: Layer[], brushed: GPUBuffer, look: Look): void {
+  draw(buffers: FrameBuffers, layers: Layer[], brushed: Rows, look: Look): void {
     this.buffers = buffers;
     let under = this.nothing;
     layers.forEach((layer, at) => {
@@ -156,22 +165,26 @@ export class Picture {
     buffers: FrameBuffers,
     layer: Layer,
     at: number,
-    brushed: GPUBuffer,
+    brushed: Rows,
     under: GPUTexture,
   ): GPUTexture {
     const { gpu } = this;
-    const { volume } = this.pipelines;
     const drawn = this.textures[at];
+    const [places, painted] = [layer.places!, layer.painted!];
+    const arrays = [places, painted, brushed, buffers.words];
+    gpu.requireBindings(arrays.reduce((sum, { layout }) => sum + layout.parts, 0), "the picture");
+    const code = volumeShader(places.layout, painted.layout, brushed.layout, buffers.words.layout);
+    const volume = gpu.compute(code, "volume");
     const groups = [
-      gpu.bound(volume, 0, { 0: layer.uniform, 1: layer.places! }),
+      gpu.bound(volume, 0, { 0: layer.uniform, ...places.bindings(PLACES.first) }),
       gpu.bound(volume, 1, {
         0: this.looks[at],
-        1: layer.painted!,
-        2: brushed,
         3: under.createView(),
         4: drawn.createView(),
+        ...painted.bindings(PAINTED.first),
+        ...brushed.bindings(BRUSHED.first),
       }),
-      gpu.bound(volume, 2, { 0: buffers.uniform, 1: buffers.bytes }),
+      gpu.bound(volume, 2, buffers.bindings()),
     ];
     gpu.submit((encoder) => run(encoder, volume, groups, fours(this.size)));
     return drawn;
@@ -179,7 +192,7 @@ export class Picture {
 
   private shine({ light, gamma }: Look): void {
     const { gpu, parts } = this;
-    const { gather, sweep } = this.pipelines;
+    const [gather, sweep] = ["gather", "sweep"].map((entry) => gpu.compute(lightCode, entry));
     const { first, size, times, slots } = this.blocks!;
     const [, , forward] = viewAxes(light.azimuth, light.elevation);
     const towards = scaled(alongCells(this.smoke, scaled(forward, -1)), 1 / times);
@@ -247,7 +260,8 @@ export class Picture {
       ...OCTAVES.map(([weight]) => weight / FACING), 0,
     ]);
     gpu.write(this.camera, numbers);
-    const { march } = this.pipelines;
+    const buffers = this.buffers!;
+    const march = gpu.render(marchShader(buffers.words.layout), "march", PICTURE);
     const pass = encoder.beginRenderPass({
       colorAttachments: [
         {
@@ -267,7 +281,7 @@ export class Picture {
     });
     pass.setBindGroup(0, group);
     pass.setBindGroup(1, gpu.bound(march, 1, {}));
-    pass.setBindGroup(2, gpu.bound(march, 2, { 0: this.buffers!.uniform, 1: this.buffers!.bytes }));
+    pass.setBindGroup(2, gpu.bound(march, 2, buffers.bindings()));
     const begin = Math.round(left * into.width);
     const wide = Math.round(right * into.width) - begin;
     if (wide > 0) {
@@ -306,6 +320,20 @@ export class Picture {
     this.release();
     for (const old of [this.camera, this.nothing, ...this.looks]) old.destroy();
   }
+}
+
+/** Cells of what is drawn along each axis; more than a page can draw are refused. */
+export function drawnSize(gpu: Gpu, { lower, upper }: Smoke, parts: number): Vector {
+  const size = lower.map((low, axis) => (upper[axis] - low) * parts + 2);
+  const most = gpu.device.limits.maxTextureDimension3D;
+  const texels = size.reduce((product, side) => product * side, 1);
+  if (Math.max(...size) > most || texels > MOST_TEXELS) {
+    throw new Problem(
+      `A volume of ${size.join(" × ")} (${mebibytes(8 * texels)}) is more than this page draws: ` +
+        "choose a smaller sequence or less detail.",
+    );
+  }
+  return size;
 }
 
 /** A unit vector of the world along the axes of the cells, which are cubes. */

@@ -2,8 +2,8 @@
 
 import { ArrayBufferTarget, Muxer } from "webm-muxer";
 import { download } from "./dom";
-import { Problem } from "./problem";
-import type { Viewer } from "./viewer";
+import { Problem } from "../problem";
+import type { Viewer } from "../viewer";
 
 const CODECS = [
   ["vp09.00.40.08", "V_VP9"],

@@ -1,6 +1,6 @@
 // What this page was given to show: `viewer/__init__.py`.
 
-import { Problem } from "./problem";
+import { Problem } from "../problem";
 
 export interface ShownRule {
   name: string;
@@ -25,12 +25,25 @@ export async function readShow(): Promise<Show> {
     throw new Problem("show.json is not there or damaged: this page has nothing to show.");
   }
   const sound =
+    typeof show === "object" &&
+    show !== null &&
     Array.isArray(show.rules) &&
     show.rules.length > 0 &&
-    show.rules.every(({ name, model }) => isLocal(model) && typeof name === "string") &&
-    isLocal(show.smoke);
+    show.rules.every(isRule) &&
+    isLocal(show.smoke) &&
+    typeof show.title === "string" &&
+    typeof show.settings === "object" &&
+    show.settings !== null;
   if (!sound) throw new Problem("show.json is damaged: this page has nothing to show.");
   return show;
+}
+
+function isRule(rule: ShownRule | null): boolean {
+  return (
+    typeof rule?.name === "string" &&
+    isLocal(rule.model) &&
+    (rule.thumbnail === undefined || isLocal(rule.thumbnail))
+  );
 }
 
 /** Whether a file lies beside the page. */

@@ -1,7 +1,7 @@
 // Play, scrub and speed.
 
 import { button, element } from "./dom";
-import type { Viewer } from "./viewer";
+import type { Viewer } from "../viewer";
 
 const PLAY = "M8 5.5v13l11-6.5z";
 const PAUSE = "M8 5.5v13M16 5.5v13";

@@ -1,8 +1,8 @@
 // What can be set, in groups: sliders that say what they are worth, and go back by a double click.
 
 import { element } from "./dom";
-import type { Settings } from "./stage";
-import type { Viewer } from "./viewer";
+import type { Settings } from "../settings";
+import type { Viewer } from "../viewer";
 
 interface Slider {
   name: keyof Settings;

@@ -1,11 +1,17 @@
 // A link that restores what is seen: what differs from the defaults, after the # of the address.
 
-import type { Viewer } from "./viewer";
-import { DEFAULTS, type Settings } from "./stage";
+import type { Viewer } from "../viewer";
+import { DEFAULTS, type Settings } from "../settings";
 
 const NAMES = Object.keys(DEFAULTS) as (keyof Settings)[];
 const CAMERA = ["azimuth", "elevation", "distance"] as const;
 const RANGES: Partial<Record<keyof Settings, [number, number]>> = {
+  seed: [0, 2 ** 31],
+  exposure: [-16, 16],
+  guide: [0, 1],
+  mix: [0, 1],
+  wipe: [0, 2],
+  brush: [0.5, 64],
   detail: [1, 4],
   strength: [0, 1],
   densityStrength: [0, 1],
@@ -17,6 +23,13 @@ const RANGES: Partial<Record<keyof Settings, [number, number]>> = {
   ambient: [0, 1],
   half: [0, 1],
 };
+
+/** A setting as it can be. */
+export function within(name: keyof Settings, value: number): number {
+  const [low, high] = RANGES[name] ?? [-1e6, 1e6];
+  const given = name === "detail" ? Math.round(value) : value;
+  return Math.min(Math.max(given, low), high);
+}
 
 /** The address of what is seen now. */
 export function linkTo(viewer: Viewer): string {
@@ -46,10 +59,8 @@ export async function restore(viewer: Viewer, hash: string): Promise<void> {
   for (const name of NAMES) {
     const value = number(name);
     if (value === null) continue;
-    const [low, high] = RANGES[name] ?? [-1e6, 1e6];
-    settings[name] = Math.min(Math.max(value, low), high);
+    settings[name] = within(name, value);
   }
-  settings.detail = Math.round(settings.detail);
   for (const name of CAMERA) {
     const value = number(name);
     if (value !== null && (name !== "distance" || value > 0)) camera[name] = value;

@@ -1,6 +1,6 @@
 // A pinhole that walks around what it looks at: `core/camera.py`, angles in degrees, +z up.
 
-import { dot, plus, scaled, type Vector } from "./matrix";
+import { dot, plus, scaled, type Vector } from "../matrix";
 
 export interface Camera {
   target: Vector;

@@ -1,12 +1,15 @@
 // A sequence of smoke, read a frame at a time: `viewer/smoke_file.py` says how it is written.
 
-import { oneLine, Problem, require } from "./problem";
+import { isAffine, isBox } from "../matrix";
+import { Problem, require } from "../problem";
 
 const MAGIC = "vncasmk1";
 const START = 1 << 16; // bytes asked for first: the header of most sequences
 const MOST_HEADER = 2 ** 24;
 const MOST_FRAMES = 100_000;
 const MOST_BRICKS = 2 ** 20;
+const MOST_PACKED = 1100; // bytes in a byte of a zlib stream: less than that
+const MOST_FIELDS = 16;
 const CACHED = 64 * 2 ** 20; // bytes of frames kept
 
 export type Vec3 = [number, number, number];
@@ -16,8 +19,16 @@ export interface Frame {
   readonly count: number;
   /** Coordinates of the bricks, in bricks. */
   readonly bricks: Int32Array;
-  /** 512 bytes a brick: density, and three components of velocity where there are any. */
+  /** 512 bytes a brick: density, and three components of velocity where there are any; then 1024 for
+   * each component of the fields. */
   readonly planes: Uint8Array<ArrayBuffer>;
+}
+
+/** What else there is at the cells: numbers in parts of the greatest, each of so many components. */
+export interface NamedField {
+  readonly name: string;
+  readonly width: number;
+  readonly scale: number;
 }
 
 interface Stored {
@@ -40,12 +51,19 @@ export class Smoke {
     readonly toWorld: number[][],
     readonly density: number,
     readonly speed: number,
+    readonly fields: NamedField[],
     private readonly stored: Stored[],
     private readonly begin: number,
   ) {}
 
   get length(): number {
     return this.stored.length;
+  }
+
+  /** Of the numbers of its cells. */
+  private get bytesOfBrick(): number {
+    const components = this.fields.reduce((sum, { width }) => sum + width, 0);
+    return 512 * (this.speed > 0 ? 4 : 1) + 1024 * components;
   }
 
   number(at: number): number {
@@ -70,7 +88,7 @@ export class Smoke {
       smoke = Smoke.described(url, name, JSON.parse(text), 12 + length);
     } catch (error) {
       if (error instanceof Problem) throw error;
-      throw new Problem(`${name}: its header is damaged (${oneLine(error)})`);
+      throw new Problem(`${name}: its header is damaged`);
     }
     if (isWhole) smoke.whole = bytes;
     return smoke;
@@ -79,22 +97,32 @@ export class Smoke {
   private static described(url: string, name: string, header: any, begin: number): Smoke {
     const check = (holds: boolean, what: string): void =>
       require(holds, `${name}: its header is damaged (${what})`);
+    check(isBox(header.box), "box");
     const [lower, upper]: Vec3[] = header.box;
-    const whole = [...lower, ...upper].every(Number.isInteger) && lower.length === 3;
-    check(whole && lower.every((low, axis) => low < upper[axis]), "box");
     const { density, speed, fps } = header;
     check(density > 0 && density < 1e30 && speed >= 0 && speed < 1e30, "scales");
     check(fps > 0 && fps <= 1000, "fps");
-    const matrix: number[][] = header.lattice_to_world;
-    check(matrix.flat().length === 16 && matrix.flat().every(Number.isFinite), "lattice_to_world");
+    const matrix: unknown = header.lattice_to_world;
+    check(isAffine(matrix), "lattice_to_world");
+    const fields: NamedField[] = header.fields ?? [];
+    check(Array.isArray(fields) && fields.length <= MOST_FIELDS, "fields");
+    for (const { name: called, width, scale } of fields) {
+      const sized = Number.isInteger(width) && width >= 1 && width <= 16;
+      check(typeof called === "string" && sized && scale >= 0 && scale < 1e30, "fields");
+    }
     const stored: Stored[] = header.frames;
     check(Array.isArray(stored) && stored.length >= 1 && stored.length <= MOST_FRAMES, "frames");
+    const places = lower.reduce(
+      (all, low, axis) => all * (Math.floor((upper[axis] - 1) / 8) - Math.floor(low / 8) + 1), 1,
+    );
     for (const { number, offset, length, bricks } of stored) {
-      const natural = [offset, length, bricks].every((n) => Number.isInteger(n) && n >= 0);
-      check(natural && Number.isInteger(number) && bricks <= MOST_BRICKS, "frames");
+      const natural = [offset, length, bricks].every((n) => Number.isSafeInteger(n) && n >= 0);
+      const fits = bricks <= Math.min(places, MOST_BRICKS);
+      check(natural && Number.isSafeInteger(number) && fits, "frames");
     }
     const title = String(header.name ?? name).slice(0, 100);
-    return new Smoke(url, title, fps, lower, upper, matrix, density, speed, stored, begin);
+    const box = [lower, upper] as const;
+    return new Smoke(url, title, fps, ...box, matrix as number[][], density, speed, fields, stored, begin);
   }
 
   /** A frame, read when it is first asked for. */
@@ -112,7 +140,7 @@ export class Smoke {
   private forget(): void {
     let kept = 0;
     for (const at of [...this.frames.keys()].reverse()) {
-      kept += this.stored[at].bricks * 2048;
+      kept += this.stored[at].bricks * this.bytesOfBrick;
       if (kept > CACHED) this.frames.delete(at);
     }
   }
@@ -129,7 +157,8 @@ export class Smoke {
       stream = this.whole.subarray(this.begin + offset, this.begin + offset + length);
     }
     require(stream.length === length, `${what}: the file ends before it`);
-    const size = count * (6 + 512 * (this.speed > 0 ? 4 : 1));
+    const size = count * (6 + this.bytesOfBrick);
+    require(size <= MOST_PACKED * Math.max(length, 1), `${what}: less than it says`);
     const data = await inflated(stream, size, what);
     const first = this.lower.map((cell) => Math.floor(cell / 8));
     const last = this.upper.map((cell) => Math.floor((cell - 1) / 8));

@@ -1,11 +1,12 @@
 // Buttons: what a finger does, what is saved, and what is seen beside.
 
 import { button, element } from "./dom";
+import { toggleHelp } from "./help";
 import { linkTo } from "./link";
 import { say } from "./notice";
-import { oneLine } from "./problem";
+import { oneLine } from "../problem";
 import { film, picture, save } from "./save";
-import type { Tool, Viewer } from "./viewer";
+import type { Tool, Viewer } from "../viewer";
 
 const ICONS = {
   orbit: "M12 4a8 8 0 1 0 8 8M20 4v5h-5",
@@ -18,6 +19,7 @@ const ICONS = {
   film: "M4 6h11v12H4zM15 10.5l5-3v9l-5-3z",
   link: "M10 14a4 4 0 0 0 6 0l3-3a4 4 0 0 0-6-6l-1 1M14 10a4 4 0 0 0-6 0l-3 3a4 4 0 0 0 6 6l1-1",
   home: "M4 11l8-7 8 7M6 10v9h12v-9",
+  help: "M9 9a3 3 0 1 1 4.2 2.7c-.8.4-1.2 1-1.2 1.8v.5M12 17.4v.1",
   settings: "M4 8h9M17 8h3M4 16h3M11 16h9M15 6v4M9 14v4",
 };
 const BRUSHES: [Tool, string][] = [
@@ -56,6 +58,7 @@ export function makeTools(viewer: Viewer): HTMLElement {
     button("Save a film", ICONS.film, () => void saveFilm(viewer)),
     button("Copy a link to what is seen (C)", ICONS.link, () => void copyLink(viewer)),
     button("Settings (H)", ICONS.settings, togglePanel),
+    button("What can be done (?)", ICONS.help, toggleHelp),
   );
 }
 

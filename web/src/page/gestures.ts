@@ -1,8 +1,8 @@
 // Fingers and mice: orbit, pan, zoom and brushes on the canvas.
 
-import { type Camera, slope, viewAxes } from "./camera";
-import { plus } from "./matrix";
-import type { Viewer } from "./viewer";
+import { type Camera, slope, viewAxes } from "../picture/camera";
+import { plus } from "../matrix";
+import type { Viewer } from "../viewer";
 
 const TURN = 0.35; // degrees a pixel
 const STEEPEST = 89;

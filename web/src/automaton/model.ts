@@ -1,11 +1,12 @@
 // A rule as a model file has it: safetensors with metadata in JSON, checked before it is believed.
 
-import { Problem, require } from "./problem";
+import { isAffine, isBox } from "../matrix";
+import { Problem, require } from "../problem";
 
 /** The newest format that is read, as `rule/model.py` writes it. */
 const FORMAT = 4;
 const MOST_BYTES = 64 * 2 ** 20;
-const MOST = { channels: 64, hidden: 1024, units: 256, dilation: 64, steps: 4096 };
+const MOST = { channels: 64, hidden: 1024, units: 256, dilation: 64, steps: 4096, width: 16 };
 const WIDTHS: Record<string, number> = { position: 3, density: 1, velocity: 3 };
 const LAYERS = ["first", "second", "third", "output"];
 
@@ -35,6 +36,8 @@ export interface Rule {
   /** The first column of each input that is not switched off, and how many columns there are. */
   readonly columns: Record<string, number>;
   readonly width: number;
+  /** Fields of the smoke that it is conditioned on, and the value that counts as 1. */
+  readonly fields: { name: string; width: number; scale: number; column: number }[];
   readonly density: number;
   readonly speed: number;
   readonly gamma: number;
@@ -47,7 +50,7 @@ export function readModel(bytes: ArrayBuffer, name: string): Rule {
     return parsed(bytes, name);
   } catch (error) {
     if (error instanceof Problem) throw error;
-    throw new Problem(`${name}: damaged model (${(error as Error).message})`);
+    throw new Problem(`${name}: damaged model`);
   }
 }
 
@@ -71,19 +74,16 @@ function parsed(bytes: ArrayBuffer, name: string): Rule {
     check(fits, `damaged model (${what} is not a number from ${low} to ${high})`);
     return value as number;
   };
-  const channels = number(shape.channels, 4, MOST.channels, "channels");
-  const units = number(shape.hidden, 1, MOST.hidden, "hidden");
+  const whole = (value: unknown, low: number, high: number, what: string): number => {
+    check(Number.isInteger(value), `damaged model (${what} is not a whole number)`);
+    return number(value, low, high, what);
+  };
+  const channels = whole(shape.channels, 4, MOST.channels, "channels");
+  const units = whole(shape.hidden, 1, MOST.hidden, "hidden");
   const listed: unknown[][] =
     about.conditioning ?? Object.entries(WIDTHS).map(([key, width]) => [key, width]);
   check(Array.isArray(listed), "damaged model");
-  const columns: Record<string, number> = {};
-  let width = 0;
-  for (const [key, wide] of listed) {
-    const known = typeof key === "string" && WIDTHS[key] === wide;
-    check(known, `the rule is conditioned on ${String(key)}, which this page does not have`);
-    if (shape[`${key as string}_prior`] !== false) columns[key as string] = width;
-    width += wide as number;
-  }
+  const { columns, fields, width } = conditioning(listed, shape, name);
   const transport: unknown = shape.transport ?? false;
   check(typeof transport === "boolean", "damaged model (transport is not true or false)");
   const hidden = sized(tensor("hidden"), units, 5 * channels + width, `${name}: hidden`);
@@ -100,19 +100,46 @@ function parsed(bytes: ArrayBuffer, name: string): Rule {
     output,
     decoder: decoder(header, tensor, channels, name),
     probability: number(shape.update_probability, 1e-9, 1, "update_probability"),
-    steps: number(shape.steps_per_frame, 1, MOST.steps, "steps_per_frame"),
+    steps: whole(shape.steps_per_frame, 1, MOST.steps, "steps_per_frame"),
     transport: transport as boolean,
-    dilation: number(shape.dilation ?? shape.reach ?? 1, 0, MOST.dilation, "dilation"),
+    dilation: whole(shape.dilation ?? shape.reach ?? 1, 0, MOST.dilation, "dilation"),
     wholeBox: shape.domain === "box",
     sobel: number(shape.sobel_divisor, 1e-9, 1e9, "sobel_divisor"),
     laplacian: number(shape.laplacian_divisor, 1e-9, 1e9, "laplacian_divisor"),
     columns,
     width,
+    fields,
     density,
     speed: velocity,
     gamma,
     place: place(about.place, name),
   };
+}
+
+/** What cells are told, and in which columns: position, density, velocity, and fields, with a scale. */
+function conditioning(
+  listed: unknown[][],
+  shape: Record<string, unknown>,
+  name: string,
+): Pick<Rule, "columns" | "fields" | "width"> {
+  const columns: Record<string, number> = {};
+  const fields: Rule["fields"] = [];
+  let width = 0;
+  for (const [key, wide, scale] of listed) {
+    const isName = typeof key === "string" && /^\w{1,100}$/.test(key);
+    const what = isName ? key : "something";
+    if (isName && scale === undefined && WIDTHS[key] === wide) {
+      if (shape[`${key}_prior`] !== false) columns[key] = width;
+    } else {
+      const isField = isName && !(key in WIDTHS) && Number.isFinite(scale) && scale !== 0;
+      require(isField, `${name}: the rule is conditioned on ${what}, which this page does not have`);
+      const fits = Number.isInteger(wide) && (wide as number) >= 1 && (wide as number) <= MOST.width;
+      require(fits, `${name}: damaged model (width of ${what})`);
+      fields.push({ name: key, width: wide as number, scale: scale as number, column: width });
+    }
+    width += wide as number;
+  }
+  return { columns, fields, width };
 }
 
 function json(text: string, name: string): any {
@@ -163,10 +190,7 @@ function decoder(
 
 function place(given: any, name: string): Rule["place"] {
   if (given === undefined || given === null) return null;
-  const toWorld: number[][] = given.lattice_to_world;
-  const [lower, upper]: number[][] = given.box;
-  const numbers = [...toWorld.flat(), ...lower, ...upper];
-  const sound = numbers.length === 22 && numbers.every((n) => Number.isFinite(n) && Math.abs(n) < 1e30);
-  require(sound && lower.every((low, axis) => low < upper[axis]), `${name}: its place cannot be`);
-  return { toWorld, lower, upper };
+  const { lattice_to_world: toWorld, box } = given;
+  require(isAffine(toWorld) && isBox(box), `${name}: its place cannot be`);
+  return { toWorld, lower: box[0], upper: box[1] };
 }

@@ -1,14 +1,10 @@
 // The keyboard.
 
 import { turn, zoom } from "./gestures";
-import { say } from "./notice";
+import { toggleHelp } from "./help";
 import { choose, copyLink, savePicture, toggleAlive, toggleBeside, togglePanel } from "./tools";
 import { toggle } from "./transport";
-import type { Viewer } from "./viewer";
-
-const HELP =
-  "Space plays · ← → frames · arrows with Shift turn · + − zoom · 1–4 brushes · N next style · " +
-  "B beside plain smoke · L alive · F frame · P picture · C link · H settings";
+import type { Viewer } from "../viewer";
 
 export function listenToKeys(viewer: Viewer): void {
   const byKey: Record<string, (event: KeyboardEvent) => void> = {
@@ -21,7 +17,7 @@ export function listenToKeys(viewer: Viewer): void {
     c: () => void copyLink(viewer),
     h: togglePanel,
     n: () => void nextStyle(viewer),
-    "?": () => say(HELP),
+    "?": toggleHelp,
     "1": () => choose(viewer, "orbit"),
     "2": () => choose(viewer, "erase"),
     "3": () => choose(viewer, "more"),
@@ -35,7 +31,9 @@ export function listenToKeys(viewer: Viewer): void {
   };
   document.addEventListener("keydown", (event) => {
     const isTyping = event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement;
+    const isHelped = (document.getElementById("help") as HTMLDialogElement | null)?.open ?? false;
     if (event.ctrlKey || event.metaKey || event.altKey || isTyping) return;
+    if (isHelped && event.key !== "?") return; // the sheet closes by Escape
     const act = byKey[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (act === undefined) return;
     event.preventDefault();

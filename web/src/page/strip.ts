@@ -2,8 +2,8 @@
 
 import { element } from "./dom";
 import { say } from "./notice";
-import { oneLine } from "./problem";
-import type { Viewer } from "./viewer";
+import { oneLine } from "../problem";
+import type { Viewer } from "../viewer";
 
 const HOLD = 500; // ms of a finger that stays, where no browser tells of it
 

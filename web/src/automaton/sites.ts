@@ -1,11 +1,15 @@
 // Which cells are active in a frame, and where they lie: what `engine/domain.py` finds, brick by
 // brick, and the cells beside them to which their colour goes on.
 
-import type { Frame, Smoke, Vec3 } from "./smoke";
+import sitesCode from "../../../src/vnca/engine/wgsl/sites.wgsl";
+import type { Layout } from "../gpu/rows";
+import type { Frame, Smoke, Vec3 } from "../smoke/smoke";
 
 export const NOWHERE = 0xffffffff;
 /** Normalised density from which a cell counts as smoke. */
 const THRESHOLD = 0.01;
+/** Bindings of the list of cells. */
+export const PLACES = { group: 0, first: 16, element: "u32" };
 /** How many cells beyond the active ones their colour goes on. */
 export const RIM = 3;
 
@@ -17,6 +21,11 @@ export interface Sites {
   readonly uniform: Int32Array<ArrayBuffer>;
   /** `places` of `sites.wgsl`. */
   readonly places: Uint32Array<ArrayBuffer>;
+}
+
+/** What shaders read of the list of cells, in group 0. */
+export function sitesShader(places: Layout): string {
+  return `${places.declared("place", PLACES)}${sitesCode}`;
 }
 
 /** Bytes at the cells of a box, z fastest. */

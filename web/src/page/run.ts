@@ -2,7 +2,7 @@
 
 import { element } from "./dom";
 import { bytesOf } from "./show";
-import type { Viewer } from "./viewer";
+import type { Viewer } from "../viewer";
 
 const EVERY = 2000; // ms
 const SMOOTH = 0.8;
