@@ -37,6 +37,22 @@ fn share_of(side: vec3i, upper: vec3f) -> f32 {
   return parts.x * parts.y * parts.z;
 }
 
+// The shares of four cells along an axis for a place between the two in the middle: Catmull & Rom.
+fn cubic(t: f32) -> vec4f {
+  return vec4f(
+    ((2.0 - t) * t - 1.0) * t, (3.0 * t - 5.0) * t * t + 2.0, ((4.0 - 3.0 * t) * t + 1.0) * t,
+    (t - 1.0) * t * t,
+  ) / 2.0;
+}
+
+// A cell that is not active counts as the next that is.
+fn among(shares: vec4f, alive: vec4<bool>) -> vec4f {
+  let outer = shares.xw * vec2f(alive.xw & alive.yz);
+  let inner = shares.yz + (shares.xw - outer);
+  let middle = select(vec2f(0.0), inner + select(inner.yx, vec2f(0.0), alive.zy), alive.yz);
+  return vec4f(outer.x, middle, outer.y);
+}
+
 // By how much what is at a cell has come to it: a midpoint step back.
 fn moved(cell: vec3i) -> vec3f {
   let here = wanted.frames * guided(velocity_at(cell), wanted.guide, wanted.speed);
@@ -73,25 +89,51 @@ fn carry(
   let cell = wanted_cell(batch.first + number);
   let upstream = clamp(-moved(cell), vec3f(-FARTHEST), vec3f(FARTHEST));
   let first = floor(upstream);
-  var rows: array<u32, 8>;
-  var shares: array<f32, 8>;
+  let place = upstream - first;
+  var rows: array<u32, 64>;
+  var shares: array<f32, 64>;
   var total = 0.0;
-  for (var corner = 0u; corner < 8u; corner++) {
-    let side = side_of(corner);
-    rows[corner] = row_of(bordered(cell + vec3i(first) + side));
-    shares[corner] = select(0.0, share_of(side, upstream - first), rows[corner] < sites.cells);
-    total += shares[corner];
+  var planes: vec4<bool>;
+  for (var i = 0; i < 4; i++) {
+    var lines: vec4<bool>;
+    for (var j = 0; j < 4; j++) {
+      let line = 16 * i + 4 * j;
+      var alive: vec4<bool>;
+      for (var k = 0; k < 4; k++) {
+        let side = vec3i(i, j, k) - 1;
+        let row = row_of(bordered(cell + vec3i(first) + side));
+        rows[line + k] = row;
+        alive[k] = row < sites.cells;
+        if (alive[k] && all((side & vec3i(~1)) == vec3i(0))) {
+          total += share_of(side, place);
+        }
+      }
+      let along_z = among(cubic(place.z), alive);
+      for (var k = 0; k < 4; k++) {
+        shares[line + k] = along_z[k];
+      }
+      lines[j] = alive.y || alive.z;
+    }
+    let along_y = among(cubic(place.y), lines);
+    for (var at = 0; at < 16; at++) {
+      shares[16 * i + at] *= along_y[at >> 2u];
+    }
+    planes[i] = lines.y || lines.z;
+  }
+  let along_x = among(cubic(place.x), planes);
+  for (var at = 0; at < 64; at++) {
+    shares[at] *= along_x[at >> 4u];
   }
   if (total < LEAST_SHARE) {
+    shares = array<f32, 64>();
     rows[0] = row_of(cell);
-    shares = array<f32, 8>(select(0.0, 1.0, rows[0] < sites.cells), 0, 0, 0, 0, 0, 0, 0);
-    total = 1.0;
+    shares[0] = select(0.0, 1.0, rows[0] < sites.cells);
   }
   for (var p = 0u; p < PLANES; p++) {
     var value = vec4f(0.0);
-    for (var corner = 0u; corner < 8u; corner++) {
-      if (shares[corner] > 0.0) {
-        value += (shares[corner] / total) * before_at(rows[corner], p);
+    for (var at = 0; at < 64; at++) {
+      if (shares[at] != 0.0) {
+        value += shares[at] * before_at(rows[at], p);
       }
     }
     after[number * PLANES + p] = value;
