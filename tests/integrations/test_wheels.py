@@ -60,9 +60,10 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[zipfile.ZipFile]
     """The wheel without its kernel, which takes minutes to compile."""
     folder = tmp_path_factory.mktemp("wheel")
     words = ("-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation")
-    settings = ("--config-settings", "wheel.cmake=false", "--wheel-dir", folder, ROOT)
+    for setting in ("wheel.cmake=false", "wheel.py-api=py3"):
+        words += ("--config-settings", setting)
     done = subprocess.run(
-        [sys.executable, *words, *map(str, settings)], capture_output=True, text=True
+        [sys.executable, *words, "--wheel-dir", folder, ROOT], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     (path,) = folder.glob("vnca-*.whl")

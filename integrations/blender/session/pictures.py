@@ -10,8 +10,8 @@ from pathlib import Path
 from PIL import Image
 
 GAP = 4
-CHOICES, WORK, TRAINING = (600, 82, 900, 512), (600, 570, 900, 1000), (600, 510, 900, 915)
-"""In a window of 900 columns: what is chosen in the panel, and what is said of the work."""
+CHOICES, WORK, TRAINING = (600, 82, 900, 490), (600, 490, 900, 898), (600, 510, 900, 915)
+"""In a window of 900 columns: halves of the panel, and what is said of a training."""
 
 
 def beside(images: list[Image.Image]) -> Image.Image:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Uses the panel in a window: `blender SCENE --python window.py -- FOLDER [EXTENSION PICTURE]`.
 
-For a Blender with a window, which may be a virtual one (`xvfb-run`), `xdotool`, which presses Esc
-as a keyboard does, and `import` of ImageMagick. The extension is installed; or EXTENSION is the
+For a Blender with a window of X11, which may be a virtual one (`xvfb-run`), and `import` of
+ImageMagick. The extension is installed; or EXTENSION is the
 folder of its sources, registered by hand where Blender knows no extensions yet. With PICTURE a
 style is trained, too.
 
@@ -10,6 +10,7 @@ FOLDER gets screenshots, and `window.json`: seconds from pressing Esc until the 
 and until the worker's process is gone, and for how long the window was busy at most meanwhile.
 """
 
+import ctypes
 import importlib
 import json
 import subprocess
@@ -28,6 +29,8 @@ MOMENTS = (("", 0.0), ("", 1.0), ("{}ing", 0.0), ("{}ing", 3.0))
 """Seconds after work is what it says, or after its start, at which Esc is pressed."""
 TICK = 0.02
 FRAME = 30
+ESCAPE = 0xFF1B
+"""X11's number of the key."""
 
 told: dict[str, Any] = {"blender": bpy.app.version_string, "cancelled": []}
 _busy = [0.0, 0.0]  # when the window last was free, and the longest time that it was not
@@ -112,8 +115,7 @@ def esc(name: str, work: Any) -> Iterator[float]:
     """Press Esc, and wait for the end."""
     job, _busy[1] = work.current, 0.0
     what = f"{job.what} {job.done}/{job.total}"
-    assert _keyboard.stdin is not None
-    _keyboard.stdin.write("mousemove 400 400 key Escape\n")
+    press_escape()
     start = time.monotonic()
     while job.is_running and time.monotonic() - start < 30:
         yield TICK
@@ -130,6 +132,17 @@ def esc(name: str, work: Any) -> Iterator[float]:
             "longest_busy": round(_busy[1], 2),
         }
     )
+
+
+def press_escape() -> None:
+    """Press Esc over the window, as a keyboard does."""
+    _x11.XOpenDisplay.restype = ctypes.c_void_p
+    display = ctypes.c_void_p(_x11.XOpenDisplay(None))
+    _xtest.XTestFakeMotionEvent(display, -1, 400, 400, ctypes.c_ulong(0))
+    key = _x11.XKeysymToKeycode(display, ctypes.c_ulong(ESCAPE)) & 0xFF
+    for is_down in (True, False):
+        _xtest.XTestFakeKeyEvent(display, key, is_down, ctypes.c_ulong(0))
+    _x11.XCloseDisplay(display)  # sends them
 
 
 def screenshot(name: str) -> Iterator[float]:
@@ -151,9 +164,8 @@ def tick() -> "float | None":
     return wait
 
 
+_x11, _xtest = (ctypes.CDLL(f"lib{name}.so.6") for name in ("X11", "Xtst"))
 _steps = steps()
-# One that is there already, so that starting it is not measured.
-_keyboard = subprocess.Popen(["xdotool", "-"], stdin=subprocess.PIPE, text=True, bufsize=1)
 Path(FOLDER).mkdir(parents=True, exist_ok=True)
 bpy.context.preferences.view.show_splash = False
 if INSTALLED not in bpy.context.preferences.addons and REST:

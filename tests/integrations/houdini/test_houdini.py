@@ -264,10 +264,51 @@ def test_the_asset_has_the_parameters_and_a_node_that_shows(
     asset.geometry.assert_not_called()
 
 
-def test_package_and_shelf_are_well_formed() -> None:
+def named(package: Modules) -> dict[str, dict[str, Any]]:
+    """The options of the parameters that the node is given, by name."""
+    package.node.templates()
+    made = [call for call in package.hou.mock_calls if call[0].endswith("ParmTemplate")]
+    return {arguments[0]: options for _, arguments, options in made}
+
+
+def test_what_is_read_are_the_parameters_of_the_node(package: Modules, tmp_path: Path) -> None:
+    node = node_of(package, tmp_path, style="", model="a.png")
+    package.node.painting_of(node)
+    read = {call.args[0] for call in (*node.parm.call_args_list, *node.parmTuple.call_args_list)}
+    assert read == set(named(package)) - {"paint", "goon"}
+
+
+def test_buttons_cook_and_shelf_call_the_package(
+    package: Modules, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    called: list[tuple[Any, ...]] = []
+    for name in ("paint", "cook", "add_after_selected"):
+
+        def note(*words: Any, name: str = name, **options: Any) -> None:
+            called.append((name, *words, options))
+
+        monkeypatch.setattr(package.node, name, note)
+    pwd = package.hou.pwd.return_value
+    parameters = named(package)
+    (tool,) = ElementTree.parse(ROOT / "toolbar" / "vnca.shelf").getroot().iter("tool")
+    scripts = [
+        *(parameters[button]["script_callback"] for button in ("paint", "goon")),
+        *(package.node.COOK, package.asset.COOK, tool.findtext("script")),
+    ]
+    for script in scripts:
+        exec(script, {"hou": package.hou})  # as Houdini does
+    assert called == [
+        ("paint", pwd, {}),
+        ("paint", pwd, {"goes_on": True}),
+        ("cook", pwd, {}),
+        ("cook", pwd, pwd.parent.return_value, {}),
+        ("add_after_selected", {}),
+    ]
+
+
+def test_the_package_puts_its_own_folder_on_the_paths() -> None:
     told = json.loads((ROOT / "package.json").read_text())
     assert told["hpath"] == "$HOUDINI_PACKAGE_PATH"
-    (tool,) = ElementTree.parse(ROOT / "toolbar" / "vnca.shelf").getroot().iter("tool")
-    code = tool.find("script")
-    assert code is not None
-    compile(code.text or "", "shelf", "exec")
+    values = {name: value for each in told["env"] for name, value in each.items()}
+    assert values["PYTHONPATH"]["value"] == "$HOUDINI_PACKAGE_PATH/python"
+    assert (ROOT / "python" / "vnca_houdini" / "__init__.py").is_file()

@@ -16,6 +16,8 @@ from vnca.io.picture import to_srgb8
 SIZE = 256
 """Pixels of the longer side, at most."""
 BACKGROUND = 0.012
+MARGIN = 0.06
+"""Seen around the smoke, of its longest side."""
 AMBIENT = 0.45
 SHADE = 0.25
 """Part of the optical depth above that shades a cell: light is scattered many times."""
@@ -56,7 +58,8 @@ def draw(path, out, *, strength, mask):
         if box.is_empty:
             pixels = np.full((SIZE, SIZE, 3), BACKGROUND)
         else:
-            pixels = _seen(*_shown(file, density, box, strength, mask))
+            around = max(round(MARGIN * max(box.shape)), 1)
+            pixels = _seen(*_shown(file, density, box.grown(around), strength, mask))
     image = Image.fromarray(to_srgb8(pixels))
     scale = SIZE / max(image.size)
     size = [max(round(side * scale), 1) for side in image.size]
