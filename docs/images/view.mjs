@@ -22,24 +22,23 @@ const PICTURES = {
   view: { size: [1120, 720], told: SEEN },
   view_beside: { size: [1120, 720], told: `${SEEN}&wipe=0.5` },
   view_phone: { ...PHONE, told: `${SEEN}&with=frost&mix=0.5` },
-  view_help: { size: [1120, 720], told: SEEN, act: () => document.getElementById("help").showModal() },
 };
 
 if (!existsSync(join(SITE, "index.html"))) {
-  const simulated = ["simulate", "plume", "--resolution", "44", "--frames", String(LAST + 1), "--out", SMOKE];
-  execFileSync(VNCA, simulated, { stdio: "inherit" });
-  execFileSync(VNCA, ["view", "stained_glass", SMOKE, "--export", SITE], { stdio: "inherit" });
+  const vnca = (...given) => execFileSync(VNCA, given, { stdio: "inherit" });
+  vnca("simulate", "plume", "--resolution", "44", "--frames", String(LAST + 1), "--out", SMOKE);
+  vnca("view", "stained_glass", SMOKE, "--export", SITE);
 }
 const asked = process.argv.slice(2);
 const [browser, server] = [await launch(), await serve(SITE)];
-for (const [name, { told, act, ...context }] of Object.entries(PICTURES)) {
+for (const [name, { told, ...context }] of Object.entries(PICTURES)) {
   if (asked.length > 0 && !asked.includes(name)) continue;
   const { page, errors, close } = await open(browser, `${server.address}#${told}`, context);
   await page.waitForSelector("body.ready");
   await page.evaluate(layDown);
-  if (act) await page.evaluate(act);
   const taken = await page.screenshot({ animations: "disabled" });
-  writeFileSync(join(HERE, `${name}.webp`), Buffer.from(await page.evaluate(asWebp, [[...taken], QUALITY])));
+  const made = await page.evaluate(asWebp, [[...taken], QUALITY]);
+  writeFileSync(join(HERE, `${name}.webp`), Buffer.from(made));
   if (errors.length > 0) throw new Error(`${name}: ${errors.join("; ")}`);
   console.log(`${name}.webp`);
   await close();

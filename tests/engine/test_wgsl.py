@@ -163,7 +163,7 @@ def test_what_is_bound_in_parts_is_the_same_to_the_bit(
     whole = both()
     monkeypatch.setattr(device, "binding_bytes", lambda: 20_000)
     divided = Rows.of(state)
-    assert divided.layout.parts > 8
+    assert divided.layout.parts > 4
     np.testing.assert_array_equal(divided.read(np.float32), state.reshape(-1))
     for ours, theirs in zip(both(), whole, strict=True):
         assert np.abs(theirs).max() > 0.1

@@ -44,6 +44,7 @@ export class Viewer extends EventTarget {
   private lastChange = 0;
   private due = 0;
   private isBusy = false;
+  private waiting = 0;
   private isClosed = false;
   private readonly rules = new Map<string, Rule>();
 
@@ -175,7 +176,9 @@ export class Viewer extends EventTarget {
 
   /** Nothing else touches the stage while this runs. */
   private async exclusively(work: () => Promise<void>): Promise<void> {
+    this.waiting++; // the next picture lets it pass, however slow pictures are
     while (this.isBusy) await new Promise((done) => setTimeout(done, 5));
+    this.waiting--;
     this.isBusy = true;
     try {
       await work();
@@ -240,7 +243,8 @@ export class Viewer extends EventTarget {
   private readonly tick = async (now: number): Promise<void> => {
     if (this.isClosed) return;
     requestAnimationFrame((later) => void this.tick(later));
-    if (this.isBusy || document.hidden || this.stage.layers.length === 0) return;
+    const isTaken = this.isBusy || this.waiting > 0;
+    if (isTaken || document.hidden || this.stage.layers.length === 0) return;
     this.isBusy = true;
     try {
       await this.frame(now);

@@ -32,9 +32,10 @@ after(async () => {
   command?.kill("SIGINT");
 });
 
-test("curves are drawn and the rule is taken over as it learns", { timeout: 2 * PATIENCE }, async () => {
-  const { page, foreign, errors, close } = await open(browser, address, { size: [700, 420] });
+test("curves are drawn and the rule is taken over as it learns", { timeout: 4 * PATIENCE }, async () => {
+  const { page, foreign, errors, close } = await open(browser, address, { size: [320, 300] });
   await page.waitForSelector("#curves path.mean");
+  await page.evaluate(() => (viewer.isAlive = false)); // so that pictures leave time for the rest
   const seen = () =>
     page.evaluate(() => ({
       title: document.querySelector("#curves h2").textContent,
@@ -60,7 +61,6 @@ test("curves are drawn and the rule is taken over as it learns", { timeout: 2 * 
   assert.equal(await page.evaluate(() => viewer.names[0]), "run_watched");
 
   const brightest = await page.evaluate(async () => {
-    viewer.isAlive = false;
     const pixels = await viewer.stage.pixels(64, 64);
     return Math.max(...pixels.filter((_, at) => at % 4 < 3));
   });

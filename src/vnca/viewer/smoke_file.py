@@ -15,8 +15,8 @@ the frames one after the other, each a zlib stream; all numbers are little-endia
 A stream has the coordinates of the bricks, counted from the brick that holds the lowest cell of the
 box, three unsigned 16-bit numbers each; then densities, 512 bytes a brick; then each component of
 velocity likewise; then each component of the fields, 512 signed 16-bit numbers a brick, of which
-32767 stands for the scale. A density is density · (byte / 255)², a component of velocity, whose byte is
-signed, speed · sign · (byte / 127)²: so thin smoke and slow motion keep their digits.
+32767 stands for the scale. A density is density · (byte / 255)², a component of velocity, whose
+byte is signed, speed · sign · (byte / 127)²: so thin smoke and slow motion keep their digits.
 """
 
 import json

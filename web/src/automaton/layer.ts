@@ -58,8 +58,8 @@ export class Layer {
     this.steps = gpu.uniform(SLOT * AT_ONCE);
     this.filters = gpu.uniform(27 * 32);
     gpu.write(this.filters, stencil(rule.sobel, rule.laplacian));
-    this.weights = gpu.buffer(packedWeights(rule, toldWidth, isHalf), "the rule");
-    this.network = gpu.buffer(packedDecoder(rule), "the decoder");
+    this.weights = gpu.buffer(packedWeights(rule, toldWidth, isHalf));
+    this.network = gpu.buffer(packedDecoder(rule));
     this.given = gpu.uniform(112);
     this.wanted = gpu.uniform(48);
     // Of painting, and of each layer of the rim of up to four parts a cell.

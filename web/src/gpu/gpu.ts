@@ -64,19 +64,12 @@ export class Gpu {
     );
   }
 
-  /** So many bytes of zeros, or an array; what cannot be bound is refused. */
-  buffer(content: number | ArrayBufferView<ArrayBuffer>, what: string, usage = 0): GPUBuffer {
+  /** So many bytes of zeros, or an array: less than any GPU binds at once. */
+  buffer(content: number | ArrayBufferView<ArrayBuffer>): GPUBuffer {
     const size = typeof content === "number" ? content : content.byteLength;
-    const most = this.bindable;
-    if (size > most) {
-      throw new Problem(
-        `${what} takes ${mebibytes(size)}, and this GPU binds at most ${mebibytes(most)}: ` +
-          "choose a smaller sequence or less detail.",
-      );
-    }
     const buffer = this.device.createBuffer({
       size: Math.max(16, Math.ceil(size / 4) * 4),
-      usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST | GPUBufferUsage.COPY_SRC | usage,
+      usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST | GPUBufferUsage.COPY_SRC,
     });
     if (typeof content !== "number") this.write(buffer, content);
     return buffer;

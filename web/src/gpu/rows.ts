@@ -1,7 +1,8 @@
 // Arrays larger than a shader binds at once: whole rows in several buffers, read as one array.
 // `engine/wgsl/parts.py` says the same.
 
-import type { Gpu } from "./gpu";
+import { require } from "../problem";
+import { type Gpu, mebibytes } from "./gpu";
 
 /** Of an array in a shader. */
 interface Declaration {
@@ -70,8 +71,10 @@ export class Rows {
   static empty(gpu: Gpu, layout: Layout, what: string): Rows {
     const { count, each, width, parts } = layout;
     gpu.requireBindings(parts, what);
+    const row = mebibytes(width);
+    require(width <= gpu.bindable, `${what}: a row of ${row} is more than this GPU binds at once.`);
     const buffers = Array.from({ length: parts }, (_, part) =>
-      gpu.buffer(Math.min(each, count - part * each) * width, what),
+      gpu.buffer(Math.min(each, count - part * each) * width),
     );
     return new Rows(gpu, layout, buffers);
   }

@@ -27,8 +27,8 @@ export function watchRun(viewer: Viewer): void {
       const told: Told = JSON.parse(new TextDecoder().decode(await bytesOf("run.json")));
       draw(place, told);
       if (told.model !== model) {
-        model = told.model;
         await viewer.learned(await bytesOf(viewer.show.rules[0].model));
+        model = told.model;
       }
     } catch {
       // The training may have ended, or the file be written right now: what is there stays.

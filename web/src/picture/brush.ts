@@ -39,7 +39,7 @@ export class Brush {
     const [x, y, z] = smoke.lower.map((low, axis) => smoke.upper[axis] - low);
     this.brushed = Rows.empty(gpu, Layout.of(gpu, x, 4 * y * z), "the mix of two rules");
     this.uniform = gpu.uniform(64);
-    this.hit = gpu.buffer(16, "a point");
+    this.hit = gpu.buffer(16);
   }
 
   static async create(gpu: Gpu, smoke: Smoke): Promise<Brush> {

@@ -126,8 +126,8 @@ export class Picture {
     const size = first.map((block, axis) => last[axis] - block + 1);
     const count = size.reduce((product, side) => product * side, 1);
     this.reached = this.texture(size);
-    this.thickness = gpu.buffer(4 * count, "the light");
-    this.depth = gpu.buffer(4 * count, "the light");
+    this.thickness = gpu.buffer(4 * count);
+    this.depth = gpu.buffer(4 * count);
     this.blocks = { first, size, times, slots: gpu.uniform(256 * Math.max(...size)) };
   }
 
