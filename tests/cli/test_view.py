@@ -12,7 +12,8 @@ import pytest
 from vnca.recipe import SILENT
 from vnca.recipe.viewing import ViewRun
 from vnca.recipe.viewing import run as show
-from vnca.rule.model import MODEL_NAME, style_names
+from vnca.rule.library import style_names
+from vnca.rule.model import MODEL_NAME
 from vnca.viewer.smoke_file import SmokeFile
 
 Vnca = Callable[..., Any]

@@ -15,7 +15,7 @@ from vnca.engine.automaton import Automaton, DecoderWeights, Weights, stencil
 from vnca.engine.domain import Border, Domain, subdivided
 from vnca.painting import StylizeConfig, stylize
 from vnca.rule import Rule
-from vnca.rule.model import load_style
+from vnca.rule.library import load_style
 
 MISSING = backend_named("wgsl").missing(Compute("wgsl"))
 pytestmark = pytest.mark.skipif(MISSING is not None, reason=str(MISSING))

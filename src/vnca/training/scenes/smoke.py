@@ -37,6 +37,8 @@ PREVIEW_STEP = 0.5
 """Distance between samples along a ray, cells: finer than in training, without terraces."""
 PREVIEW_BACKGROUND = 0.01
 """Linear grey behind the smoke."""
+_THINNEST = 1e-3
+"""Opacity of what is hardly seen."""
 _UPRIGHT = 1e-6
 """Cells turned and stretched by less than this are upright cubes."""
 
@@ -212,6 +214,22 @@ class SmokeScene(Scene[SmokeViewpoint]):
         view = self.look(state, viewpoint.camera, offset=viewpoint.offset)
         picture = linear_to_srgb(view.over(background))
         return picture.permute(2, 0, 1)[None], view.opacity[None]
+
+    @torch.no_grad()
+    def seen_shares(self, shares: Tensor, viewpoint: SmokeViewpoint) -> Tensor:
+        """See `Scene.seen_shares`; of the smoke with the density of its file."""
+        view = render(
+            self.dense(self._density),
+            self.dense(shares[:, None].expand(-1, 3)),
+            viewpoint.camera,
+            rows=self.view.size,
+            columns=self.view.size,
+            gamma=self.gamma,
+            step=self.view.step,
+            offset=viewpoint.offset,
+            cells_to_world=self._place,
+        )
+        return (view.colour[..., 0] / view.opacity.clamp_min(_THINNEST))[None].clamp(0, 1)
 
     def density_pictures(
         self, state: Tensor, viewpoint: SmokeViewpoint, background: Tensor
