@@ -109,6 +109,22 @@ def test_it_is_measured_by_the_picture_of_the_style_asked_for(vnca: Vnca, traine
     assert "--layers: what is measured is one rule" in layered.complaint
 
 
+def test_a_block_is_grown_in_the_style_asked_for(vnca: Vnca, trained: Path, tmp_path: Path) -> None:
+    grown = ("--block", 16, "--steps", 3, "--out")
+    said = vnca("texture", "volume", trained, *grown, tmp_path / "first.npz")
+    assert "growing the first of the styles 1 style, 2 lava" in said.err
+    for name in ("1", "lava"):
+        out = tmp_path / f"{name}.npz"
+        assert vnca("texture", "volume", trained, *grown, out, "--style", name).code == 0
+    first, again, lava = (
+        np.load(tmp_path / f"{name}.npz")["Cd"] for name in ("first", "1", "lava")
+    )
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, lava)
+    wrong = vnca("texture", "volume", trained, *grown, out, "--style", "sea")
+    assert "--style sea: the model has the styles 1 style, 2 lava" in wrong.complaint
+
+
 def test_too_many_pictures_and_broken_ones_are_told(
     vnca: Vnca, frame: Path, style: Path, tiny: list[str], tmp_path: Path
 ) -> None:

@@ -22,6 +22,7 @@ from vnca.io.film import contact_sheet
 from vnca.io.picture import fit, write_image
 from vnca.io.vdb import GridHeader, open_vdb
 from vnca.rule import CONDITIONING
+from vnca.rule.conditioning import STYLES
 from vnca.rule.library import SUFFIX, load_style, style_names, style_thumbnail
 from vnca.rule.model import MODEL_NAME, STYLES_TOLD, Model, listed_conditioning
 from vnca.rule.styles import alone
@@ -142,7 +143,7 @@ def describe_model(path: Path) -> list[str]:
         *(
             f"  conditioned on {_described_input(name)}"
             for name in config.conditioning
-            if name not in CONDITIONING
+            if name not in (*CONDITIONING, *STYLES)
         ),
         f"  scales      density {scales.density:.4g}, velocity {scales.velocity:.4g} cells/frame, "
         f"gamma {scales.gamma:.4g} per cell",

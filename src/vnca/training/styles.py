@@ -113,10 +113,9 @@ class Mix:
         if not isinstance(self.share, np.ndarray):
             return Judged(self.second if threshold < self.share else self.first, None)
         seen = scene.seen_shares(torch.from_numpy(self.share).to(scene.priors), viewpoint)
-        where = seen > threshold
-        if which < self.share.mean():
-            return Judged(self.second, where)
-        return Judged(self.first, ~where)
+        first, second = seen <= threshold, seen > threshold  # neither where nothing is seen
+        of_second = float(second.sum()) / max(1.0, float((first | second).sum()))
+        return Judged(self.second, second) if which < of_second else Judged(self.first, first)
 
 
 class Lessons:

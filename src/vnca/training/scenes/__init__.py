@@ -120,6 +120,8 @@ class Scene(ABC, Generic[Viewpoint]):
     def seen_shares(self, shares: Tensor, viewpoint: Viewpoint) -> Tensor:
         """Of what is seen in each pixel of `pictures`, `[b, r, c]`, the part that a field has.
 
+        Not a number where nothing is seen.
+
         Args:
             shares: The field, `[n]`, from 0 to 1.
             viewpoint: Where to look from.

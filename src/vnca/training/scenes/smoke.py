@@ -17,6 +17,7 @@ from vnca.core.errors import GridError
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
 from vnca.losses import luma
+from vnca.losses.appearance import AppearanceLoss
 from vnca.rendering import Shader, View, projected_velocity, render
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
 from vnca.rule import SMOKE_THRESHOLD, Rule, gamma_for_own_colour
@@ -37,8 +38,6 @@ PREVIEW_STEP = 0.5
 """Distance between samples along a ray, cells: finer than in training, without terraces."""
 PREVIEW_BACKGROUND = 0.01
 """Linear grey behind the smoke."""
-_THINNEST = 1e-3
-"""Opacity of what is hardly seen."""
 _UPRIGHT = 1e-6
 """Cells turned and stretched by less than this are upright cubes."""
 
@@ -229,7 +228,8 @@ class SmokeScene(Scene[SmokeViewpoint]):
             offset=viewpoint.offset,
             cells_to_world=self._place,
         )
-        return (view.colour[..., 0] / view.opacity.clamp_min(_THINNEST))[None].clamp(0, 1)
+        share = (view.colour[..., 0] / view.opacity).clamp(0, 1)
+        return torch.where(view.opacity > AppearanceLoss.least_opacity, share, torch.nan)[None]
 
     def density_pictures(
         self, state: Tensor, viewpoint: SmokeViewpoint, background: Tensor

@@ -223,13 +223,14 @@ class BlockScene(Scene[list[Cut]]):
 
     @torch.no_grad()
     def seen_shares(self, shares: Tensor, viewpoint: list[Cut]) -> Tensor:
-        """See `Scene.seen_shares`; 0 beside the mesh."""
+        """See `Scene.seen_shares`."""
         size, samples = self.slices.size, self.slices.supersampling
         field, pictures = self.dense(shares[:, None]), []
         for points, covered in viewpoint:
             part = shown(field, points)
             if covered is not None:
-                part = field.new_zeros(*covered.shape, 1).index_put((covered,), part)
+                empty = field.new_full((*covered.shape, 1), torch.nan)
+                part = empty.index_put((covered,), part)
             pictures.append(averaged(part, samples).view(size, size))
         return torch.stack(pictures)
 
