@@ -31,7 +31,7 @@ def completed(answers: Sequence[Answer], which: Sequence[int], count: int) -> Fl
         shares[..., 0] = np.maximum(0, 1 - shares.sum(-1))
     whole = shares.sum(-1, keepdims=True)
     shares[..., :1] += whole == 0
-    return shares / np.where(whole == 0, np.float32(1), whole)
+    return (shares / np.where(whole == 0, np.float32(1), whole)).astype(np.float32)
 
 
 def is_even(value: Value) -> bool:

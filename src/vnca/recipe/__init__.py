@@ -101,7 +101,7 @@ def given_pictures(
     style: PictureGiven | Sequence[PictureGiven],
 ) -> tuple[list[Path], list[FloatArray] | None]:
     """The paths of pictures, and the pictures themselves unless all of them are files."""
-    several: Sequence[Any] = style if isinstance(style, (list, tuple)) else [style]
+    several: list[Any] = [*style] if isinstance(style, (list, tuple)) else [style]
     paths = [Path(one) if isinstance(one, (str, Path)) else IN_MEMORY for one in several]
     if IN_MEMORY not in paths:
         return paths, None
