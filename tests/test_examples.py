@@ -8,6 +8,8 @@ from types import ModuleType
 import pytest
 
 import vnca
+from vnca.rule import Rule, RuleConfig, Scales
+from vnca.rule.model import MODEL_NAME, STYLES_TOLD, Model
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -29,6 +31,19 @@ def test_a_shot(tmp_path: Path) -> None:
         tmp_path / "shot.toml", frames="2-4", refine=1, without_film=True, device="cpu"
     )
     assert [file.parent for file in files] == 3 * [tmp_path / "painted_shot" / "painted"]
+
+
+def test_a_shot_in_two_styles(tmp_path: Path) -> None:
+    """With a model that was made up, since training takes longer."""
+    shutil.copy(EXAMPLES / "two_styles.toml", tmp_path)
+    assert len([*vnca.simulate("plume", out=tmp_path / "smoke", resolution=16, frames=4)]) == 4
+    config = RuleConfig(channels=6, hidden=8, conditioning=("density", "style_1", "style_2"))
+    told = {STYLES_TOLD: [{"name": "vangogh_cafe_terrace"}, {"name": "rust"}]}
+    Model(Rule.initial(config, Scales(), seed=0), told).save(tmp_path / "two_styles" / MODEL_NAME)
+    files = vnca.paint(
+        tmp_path / "two_styles.toml", frames="2-4", refine=1, without_film=True, device="cpu"
+    )
+    assert [file.parent for file in files] == 3 * [tmp_path / "painted_two_styles" / "painted"]
 
 
 # They train networks at their real size, if for an iteration only.

@@ -31,7 +31,8 @@ import vnca
 from vnca.io.picture import resize, to_srgb8
 from vnca.recipe.film import FilmConfig, picture
 from vnca.recipe.sequence import region_bounds
-from vnca.rule.model import SUFFIX, THUMBNAIL, Model
+from vnca.rule.library import SUFFIX, THUMBNAIL
+from vnca.rule.model import Model
 
 SIZE = 160
 """Rows and columns of a thumbnail, pixels."""

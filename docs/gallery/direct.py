@@ -21,7 +21,10 @@ LAST, SIDE = 24, 176
 SMOKE = ("--resolution", 36, "--frames", LAST)
 PAINTED = ("--frames", f"{LAST - 3}-{LAST}", "--refine", 2, "--without-film")
 SEEN = ("--rows", SIDE, "--columns", SIDE, "--frames", LAST, "--light", 0.9)
-GLASS, FROST = "stained_glass", "frost"
+GLASS, FROST, TWO = "stained_glass", "frost", "two_styles"
+DATA = HERE.parents[1] / "src" / "vnca" / "data"
+LEARNT = DATA / "vangogh_cafe_terrace.webp", DATA / "rust.webp"
+"""The pictures of a rule of two styles."""
 CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "strength": (GLASS, ("--strength", 0.4)),
     "mask": (GLASS, ("--strength", "sphere(0.5,0.2,0.35, 0.2, soft=0.15)")),
@@ -32,6 +35,8 @@ CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "advected": (GLASS, ("--strength", "advected(smooth x:0.4..0.6)")),
     "density_strength": (GLASS, ("--density-strength", 0)),
     "steps_per_frame": (GLASS, ("--steps-per-frame", 2)),
+    "style_mix": (TWO, ("--style-mix", "rust=smooth x:0.4..0.6")),
+    "style_half": (TWO, ("--style-mix", "rust=0.5")),
     "layers": (GLASS, ("--layers", "frost=smooth x:0.4..0.6")),
     "hue": (GLASS, ("--hue", 140)),
     "saturation": (GLASS, ("--saturation", 0.3)),
@@ -58,6 +63,8 @@ def main(folder: str) -> None:
     made(
         work / "smoke" / f"plume_{LAST:04d}.vdb", "simulate", "plume", "-o", work / "smoke", *SMOKE
     )
+    frame = work / "smoke" / f"plume_{LAST - 4:04d}.vdb"
+    made(work / TWO / "model.safetensors", "train", frame, *LEARNT, "--out", work / TWO)
     stripes = np.zeros((64, 64, 3), np.float32)
     stripes[(np.add.outer(np.arange(64), np.arange(64)) // 8) % 2 == 0] = 1
     write_image(work / "stripes.png", stripes)
@@ -83,7 +90,8 @@ def seen(
     out = work / f"{style}_{name}"
     picture = work / f"{out.name}{'_thin' * (shown == THIN)}.png"
     last = out / "painted" / f"plume_{LAST:04d}.vdb"
-    made(last, "paint", work / "smoke", "--style", style, "-o", out, *PAINTED, *options)
+    rule = (work / TWO,) if style == TWO else ("--style", style)
+    made(last, "paint", work / "smoke", *rule, "-o", out, *PAINTED, *options)
     # What is given later wins.
     return made(picture, "render", out / "painted", "-o", picture, *SEEN, *shown)
 

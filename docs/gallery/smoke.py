@@ -17,7 +17,7 @@ from workshop import HERE, made
 
 from vnca.core.colour import srgb_to_linear
 from vnca.io.picture import fit, write_image
-from vnca.rule.model import SUFFIX, load_style, style_names
+from vnca.rule.library import SUFFIX, load_style, style_names
 
 FILMS = HERE / "smoke"
 THUMBNAIL = 200

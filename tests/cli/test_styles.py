@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from vnca.io.vdb import open_vdb
-from vnca.rule.model import style_names
+from vnca.rule.library import style_names
 
 Vnca = Callable[..., Any]
 

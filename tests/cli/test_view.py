@@ -15,7 +15,8 @@ from vnca.recipe.viewing import ViewRun
 from vnca.recipe.viewing import run as show
 from vnca.rule import conditioning
 from vnca.rule.conditioning import Conditioning
-from vnca.rule.model import MODEL_NAME, Model, style_names
+from vnca.rule.library import style_names
+from vnca.rule.model import MODEL_NAME, Model
 from vnca.viewer.smoke_file import SmokeFile
 
 Vnca = Callable[..., Any]

@@ -15,7 +15,8 @@ from vnca.core.errors import GridError, OptionError
 from vnca.io import read_smoke
 from vnca.io.provenance import read_provenance
 from vnca.io.vdb import open_vdb
-from vnca.rule.model import Model, load_style
+from vnca.rule.library import load_style
+from vnca.rule.model import Model
 
 Painted = Callable[..., list[dict[str, Any]]]
 RIGHT = "x:2.6..4"

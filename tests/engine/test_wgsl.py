@@ -18,7 +18,7 @@ from vnca.engine.wgsl import device, session
 from vnca.engine.wgsl.parts import Rows
 from vnca.painting import StylizeConfig, stylize
 from vnca.rule import Rule
-from vnca.rule.model import load_style
+from vnca.rule.library import load_style
 
 MISSING = backend_named("wgsl").missing(Compute("wgsl"))
 

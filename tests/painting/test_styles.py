@@ -7,7 +7,7 @@ import pytest
 
 from vnca.core.volume import Volume
 from vnca.painting import StylizeConfig, stylize
-from vnca.rule.model import load_style, style_names
+from vnca.rule.library import load_style, style_names
 
 SIDE, FRAMES = 16, 40
 BLACK, WHITE = 1e-4, 0.999

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from vnca.core.errors import OptionError
-from vnca.rule.model import load_style, nearest_style, style_names, style_thumbnail
+from vnca.rule.library import load_style, nearest_style, style_names, style_thumbnail
 
 MOST_BYTES = 100_000
 

@@ -187,7 +187,7 @@ def rewritten(path: Path, **changes: Any) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"format_version": 5}, r"newer than this vnca reads.*upgrade"),
+        ({"format_version": 99}, r"newer than this vnca reads.*upgrade"),
         ({"format_version": "one"}, "damaged"),
         ({"rule": None}, "damaged"),
         ({"rule": 3}, "damaged"),

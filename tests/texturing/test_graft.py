@@ -11,7 +11,7 @@ from vnca.core import FloatArray
 from vnca.core.errors import OptionError
 from vnca.recipe import Silent
 from vnca.rule import PRIORS
-from vnca.rule.model import load_style
+from vnca.rule.library import load_style
 
 SMALL: dict[str, Any] = {
     "iterations": 1,

@@ -58,7 +58,7 @@ def test_any_network_teaches(style: FloatArray, tiny_config: TextureConfig, sour
     before = weights(learning)
     assert all(np.isfinite(step.loss) for step in learning.run())
     assert not np.array_equal(before[2], weights(learning)[2])
-    assert learning.picture_cells == learning.style_scale * config.slice.cells
+    assert learning.picture_cells == [learning.appearances[0].style_scale * config.slice.cells]
 
 
 def test_same_seed_same_weights_and_another_seed_others(trainer: Make) -> None:

@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,21 +15,17 @@ from vnca.cli.options import parse, print_json
 from vnca.cli.terminal import made
 from vnca.core import FloatArray
 from vnca.core.colour import srgb_to_linear
-from vnca.core.errors import FileFormatError, printable
-from vnca.core.files import existing_file, writable_file
+from vnca.core.errors import FileFormatError, OptionError, printable
+from vnca.core.files import existing_file, writable_file, writable_folder
 from vnca.direction.colour.palette import codes, main_colours
 from vnca.io.film import contact_sheet
 from vnca.io.picture import fit, write_image
 from vnca.io.vdb import GridHeader, open_vdb
 from vnca.rule import CONDITIONING
-from vnca.rule.model import (
-    MODEL_NAME,
-    Model,
-    listed_conditioning,
-    load_style,
-    style_names,
-    style_thumbnail,
-)
+from vnca.rule.conditioning import STYLES
+from vnca.rule.library import SUFFIX, load_style, style_names, style_thumbnail
+from vnca.rule.model import MODEL_NAME, STYLES_TOLD, Model, listed_conditioning
+from vnca.rule.styles import alone
 
 
 @dataclass(frozen=True)
@@ -98,7 +94,11 @@ def _model_facts(path: Path) -> dict[str, Any]:
         "rule": asdict(model.rule.config),
         "conditioning": list(map(listed_conditioning, model.rule.config.conditioning)),
         "scales": asdict(model.rule.scales),
-        "palette": _palette(model),
+        **({} if model.style_names else {"palette": _palette(model)}),
+        "styles": [
+            {"number": number, **told, "palette": palette}
+            for number, told, palette in _styles(model)
+        ],
         "training": model.training,
     }
 
@@ -143,13 +143,32 @@ def describe_model(path: Path) -> list[str]:
         *(
             f"  conditioned on {_described_input(name)}"
             for name in config.conditioning
-            if name not in CONDITIONING
+            if name not in (*CONDITIONING, *STYLES)
         ),
         f"  scales      density {scales.density:.4g}, velocity {scales.velocity:.4g} cells/frame, "
         f"gamma {scales.gamma:.4g} per cell",
-        f"  palette     {' '.join(_palette(model)) or 'not known'}",
-        *(f"  {name:11} {json.dumps(value)}" for name, value in model.training.items()),
+        *(
+            f"  style {number}     {told['name']}: {told.get('style', '')}, "
+            f"palette {' '.join(palette) or 'not known'}"
+            for number, told, palette in _styles(model)
+        ),
+        *(
+            []
+            if model.style_names
+            else [f"  palette     {' '.join(_palette(model)) or 'not known'}"]
+        ),
+        *(
+            f"  {name:11} {json.dumps(value)}"
+            for name, value in model.training.items()
+            if name != STYLES_TOLD
+        ),
     ]
+
+
+def _styles(model: Model) -> Iterator[tuple[int, Mapping[str, Any], list[str]]]:
+    """Of each of several styles its number, what the model tells of it, and its palette."""
+    for number, told in enumerate(model.training.get(STYLES_TOLD, ())):
+        yield number + 1, told, _palette(alone(model, number))
 
 
 def _palette(model: Model) -> list[str]:
@@ -208,10 +227,20 @@ COLUMNS = 3
 
 @dataclass(frozen=True)
 class Styles:
-    """List the styles that paint without training: vnca paint SMOKE --style NAME --out DIR."""
+    """List the styles that paint without training: vnca paint SMOKE --style NAME --out DIR.
 
+    `vnca styles MODEL` lists those of a model that has learnt several, between which --style-mix
+    chooses.
+    """
+
+    model: Annotated[tyro.conf.Positional[Path | None], tyro.conf.arg(metavar="[MODEL]")] = None
+    """A model of several styles, or the folder of its run."""
     sheet: Path | None = None
-    """A picture of all of them to write: each picture, and smoke painted in its style."""
+    """A picture of all of them to write: each picture, and smoke painted in its style; of a MODEL
+    its pictures."""
+    save: Path | None = None
+    """Folder in which to write each style of the MODEL as a model of its own, which older programs
+    and the page of `vnca view` read, too."""
     json: bool = False
     """Print JSON."""
 
@@ -223,6 +252,11 @@ def run_styles(arguments: Sequence[str]) -> None:
         VncaError: If the sheet cannot be written.
     """
     options = parse("styles", Styles, arguments)
+    if options.model is not None:
+        _run_styles_of(options.model, options)
+        return
+    if options.save is not None:
+        raise OptionError(f"--save {options.save}: the styles of which model? name it before")
     named = {name: load_style(name) for name in style_names()}
     if options.sheet is not None:
         writable_file(options.sheet)
@@ -240,6 +274,33 @@ def run_styles(arguments: Sequence[str]) -> None:
             options.sheet, contact_sheet([[p for pair in row for p in pair] for row in rows])
         )
         made("sheet", options.sheet)
+
+
+def _run_styles_of(path: Path, options: Styles) -> None:
+    """List the styles of a model, and write them as asked.
+
+    Raises:
+        VncaError: If it has none to choose between, or an output cannot be written.
+    """
+    model = Model.load(path)
+    if not model.style_names:
+        raise OptionError(f"{path}: has learnt a single style, {model.training.get('style', '?')}")
+    if options.sheet is not None:
+        writable_file(options.sheet)
+    if options.save is not None:
+        writable_folder(options.save).mkdir(parents=True, exist_ok=True)
+    if options.json:
+        print_json(_model_facts(path)["styles"])
+    else:
+        for number, told, palette in _styles(model):
+            print(f"{number} {told['name']:22}{told.get('style', ''):40}{' '.join(palette)}")
+    if options.sheet is not None:
+        write_image(options.sheet, contact_sheet([[_linear(each) for each in model.thumbnails]]))
+        made("sheet", options.sheet)
+    if options.save is not None:
+        for number, name in enumerate(model.style_names):
+            alone(model, number).save(options.save / f"{name}{SUFFIX}")
+        made("models", options.save)
 
 
 def _linear(picture: np.ndarray | None) -> FloatArray:

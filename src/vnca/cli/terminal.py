@@ -16,7 +16,7 @@ from vnca.cli.help import as_option
 from vnca.core.errors import Terminated
 
 T = TypeVar("T")
-_ARGUMENT = re.compile(r"`([a-z_]+(?:\.[a-z_]+)*)`")
+_ARGUMENT = re.compile(r"`([a-z_]+(?:\.\w+)*)`")
 
 # A terminal line is redrawn; a log gets a line now and then.
 _REDRAW_SECONDS = 0.2

@@ -31,6 +31,7 @@ from vnca.painting.block import KIND, LARGEST, SMALLEST, Block, grow
 from vnca.rule import Rule
 from vnca.rule.model import Model
 from vnca.rule.paint import require_refinement
+from vnca.rule.styles import alone, style_number
 
 COMMANDS = {
     "train": "learn a solid texture from one picture",
@@ -62,6 +63,9 @@ class BlockConfig:
     """Steps of the automaton from nothing to the texture."""
     steps_per_frame: int | None = None
     """Steps between two pictures of a texture that changes; the rule's own pace unless given."""
+    style: str | None = None
+    """Of a model of several styles, the one that is grown, by name or number; the first unless
+    given."""
     seed: int = 0
     """Same seed, same machine, same block."""
     backend: str = "auto"
@@ -79,13 +83,18 @@ class BlockConfig:
             raise OptionError(f"--steps-per-frame {self.steps_per_frame}: must not be negative")
 
 
-def texture_rule(path: Path) -> Rule:
-    """The rule of a model; says so if it was not trained as a texture.
+def texture_rule(path: Path, style: str | None = None) -> Rule:
+    """The rule of a model, in a style of several; says so if it was not trained as a texture.
 
     Raises:
-        VncaError: If the model cannot be read.
+        VncaError: If the model cannot be read, or has no such style.
     """
     model = Model.load(path)
+    number = 0 if style is None else style_number(model, style, "style")
+    if style is None and model.style_names:
+        listed = ", ".join(f"{n} {name}" for n, name in enumerate(model.style_names, 1))
+        say(f"growing the first of the styles {listed}; --style asks for another")
+    model = alone(model, number)
     if model.training.get("kind") != KIND:
         say(f"{path}: was trained on smoke, not as a texture (vnca texture train)")
     return model.rule
@@ -164,7 +173,7 @@ def run_bake(arguments: Sequence[str]) -> None:
     """
     options = parse("texture bake", Bake, arguments)
     writable_file(options.out)
-    rule = texture_rule(options.model)
+    rule = texture_rule(options.model, options.grow.style)
     mesh = read_mesh(options.mesh, options.up_axis)
     place = Placement.of(mesh, size=options.grow.block, scale=options.scale)
     if options.out.suffix.lower() == ".ply":
@@ -231,7 +240,7 @@ def run_volume(arguments: Sequence[str]) -> None:
     """Read the options and write the block."""
     options = parse("texture volume", BlockVolume, arguments)
     writable_file(options.out)
-    (block,) = grown_blocks(texture_rule(options.model), options.grow)
+    (block,) = grown_blocks(texture_rule(options.model, options.grow.style), options.grow)
     write = _write_vdb if options.out.suffix.lower() == ".vdb" else _write_npz
     write(options.out, block.refined(options.refine))
     made("block", options.out)
@@ -320,7 +329,7 @@ def _shaders(
     if options.model is None:
         yield from repeat(textured(table, mesh))
         return
-    rule = texture_rule(options.model)
+    rule = texture_rule(options.model, options.grow.style)
     place = Placement.of(mesh, size=options.grow.block, scale=options.scale)
     if options.grow.steps_per_frame == 0:
         (block,) = grown_blocks(rule, options.grow)

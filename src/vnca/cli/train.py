@@ -1,4 +1,4 @@
-"""`vnca train FRAME STYLE --out RUN`, `vnca texture train STYLE --out RUN`, and going on."""
+"""`vnca train FRAME STYLE … --out RUN`, `vnca texture train STYLE … --out RUN`, and going on."""
 
 import webbrowser
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _MISSING: Any = tyro.MISSING
 
 @dataclass(frozen=True, kw_only=True)
 class Train(smoke.SmokeRun):
-    """Learn a rule from one frame of smoke and one picture.
+    """Learn a rule from one frame of smoke and one picture, or several.
 
     `vnca train --resume RUN` goes on with a training that was interrupted.
     `vnca train --show-preset > mine.toml` writes a preset to change, and to train with by `-p
@@ -36,6 +36,11 @@ class Train(smoke.SmokeRun):
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
+    more_styles: Annotated[
+        tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[STYLE …]")
+    ] = ()
+    """Further pictures, up to eight in all: the rule learns them all and mixes them as it is told
+    when it paints (`--style-mix`). For K pictures there are √K times as many iterations."""
     preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = DEFAULT
     """Values of all hyperparameters that are not given: draft, standard, paper, or a TOML file."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
@@ -65,7 +70,7 @@ class ShowPreset:
 
 @dataclass(frozen=True, kw_only=True)
 class TrainTexture(texture.TextureRun):
-    """Learn a solid texture from one picture.
+    """Learn a solid texture from one picture, or several.
 
     `vnca texture train --resume RUN` goes on with a training that was interrupted.
     `vnca texture train --show-preset > mine.toml` writes a preset to change, and to train with by
@@ -76,6 +81,11 @@ class TrainTexture(texture.TextureRun):
     """Folder of the run: model, configuration, previews and loss curves."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
+    more_styles: Annotated[
+        tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[STYLE …]")
+    ] = ()
+    """Further pictures, up to eight in all: the rule learns them all and mixes them as it is told
+    when it paints (`--style-mix`). For K pictures there are √K times as many iterations."""
     preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = DEFAULT
     """Values of all hyperparameters that are not given: draft, standard, or a TOML file."""
     config: TextureConfig = field(default_factory=TextureConfig)

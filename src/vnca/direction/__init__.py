@@ -5,7 +5,7 @@ at places of a `Moment`.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from vnca.direction.colour.grading import graded
 from vnca.direction.grammar import parsed
 from vnca.direction.mixing import Answer, mixed, per_colour
 from vnca.direction.moment import Inputs, Missing, Moment
+from vnca.direction.shares import completed, is_even
 from vnca.direction.silhouette import Silhouette, fluffed, outlined
 from vnca.direction.values import Constant, Keys, Value
 
@@ -41,6 +42,8 @@ class Limits(NamedTuple):
 Amount = float | str
 """A number, or the text of a value."""
 Share = Annotated[Amount, Limits(0, 1)]
+MIXES = ("style_mix", "blend")
+"""Options that say of how much something is mixed."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +91,14 @@ class Direction:
     """Keep as much smoke in all as there was."""
     masks: tuple[str, ...] = ()
     """Masks, NAME=VALUE; others call them @NAME."""
+    style_mix: tuple[str, ...] = ()
+    """Of a model that has learnt several styles, how much is painted of each: STYLE=VALUE by its
+    name or number, or STYLE alone for all of it. The first takes what the others leave."""
     layers: tuple[str, ...] = ()
     """Styles or models over the first, STYLE=VALUE."""
+    blend: tuple[str, ...] = ()
+    """Models, MODEL=VALUE, whose weights are mixed with those of the first, frame by frame; all
+    have to come from the same texture."""
     missing: Missing = "stop"
     """Where a frame lacks a grid that a value asks for: stop, zero, or hold the one before."""
 
@@ -103,6 +112,16 @@ class Direction:
             self._require_limits(name, self.values[name], getattr(self, name))
         for (name, text), value in zip(_entries("layers", self.layers), self.shares, strict=True):
             self._require_limits(f"layers.{name}", value, text, Limits(0, 1))
+        for option in MIXES:
+            entries = _entries(option, getattr(self, option), whole="1")
+            for (name, text), value in zip(entries, self.mixes[option], strict=True):
+                self._require_limits(f"{option}.{name}", value, text, Limits(0, 1))
+        for name, value in zip(self.mixed_names("blend"), self.mixes["blend"], strict=True):
+            if not is_even(value):
+                raise OptionError(
+                    f"`blend.{name}`: a rule has the same weights everywhere; they may change from "
+                    "frame to frame alone (over places: `layers`)"
+                )
 
     @cached_property
     def masked(self) -> Mapping[str, Value]:
@@ -123,6 +142,21 @@ class Direction:
         given = _entries("layers", self.layers)
         return tuple(parsed(text, f"layers.{name}", self.masked) for name, text in given)
 
+    @cached_property
+    def mixes(self) -> Mapping[str, tuple[Value, ...]]:
+        """How much is asked for of each style, and of each model whose weights are mixed."""
+        return {
+            option: tuple(
+                parsed(text, f"{option}.{name}", self.masked)
+                for name, text in _entries(option, getattr(self, option), whole="1")
+            )
+            for option in MIXES
+        }
+
+    def mixed_names(self, option: str) -> tuple[str, ...]:
+        """Of which style or model each of them is, by an option in `MIXES`."""
+        return tuple(name for name, _ in _entries(option, getattr(self, option), whole="1"))
+
     @property
     def layer_names(self) -> tuple[str, ...]:
         """The style or model of each layer."""
@@ -130,7 +164,8 @@ class Direction:
 
     def parts(self) -> Iterator[Value]:
         """All values that are asked for, and what they are made of."""
-        for value in (*self.values.values(), *self.shares):
+        mixes = (value for option in MIXES for value in self.mixes[option])
+        for value in (*self.values.values(), *self.shares, *mixes):
             if value is not None:
                 yield from value.parts()
 
@@ -167,6 +202,25 @@ class Direction:
         """How much is seen of a layer, as `value` tells a number."""
         answer = self.shares[layer].at(moment, places)
         return _within(answer, Limits(0, 1), "layers", self.layers[layer], moment)
+
+    def mix(
+        self, option: str, which: Sequence[int], count: int, moment: Moment, places: AnyArray
+    ) -> FloatArray:
+        """Shares of styles, or of models, together 1: `[count]`, or of each place `[n, count]`.
+
+        Args:
+            option: One of `MIXES`.
+            which: Of which of them each value is, the first 0.
+            count: Of all of them.
+            moment: The frame.
+            places: `[n, 3]`.
+        """
+        given = zip(self.mixes[option], getattr(self, option), strict=True)
+        answers = [
+            _within(value.at(moment, places), Limits(0, 1), option, text, moment)
+            for value, text in given
+        ]
+        return completed(answers, which, count)
 
     def coloured(
         self, colour: FloatArray, moment: Moment, places: AnyArray, editing: Editing
@@ -242,8 +296,13 @@ class Direction:
                 raise OptionError(f"`{name}` {shown}: must be from {low:g} to {high:g}")
 
 
-def _entries(option: str, texts: tuple[str, ...]) -> list[tuple[str, str]]:
+def _entries(option: str, texts: tuple[str, ...], whole: str = "") -> list[tuple[str, str]]:
     """Names and values of texts NAME=VALUE.
+
+    Args:
+        option: What messages call it.
+        texts: The texts.
+        whole: The value of a name alone; without it a value is needed.
 
     Raises:
         OptionError: If one has no name or no value.
@@ -251,6 +310,8 @@ def _entries(option: str, texts: tuple[str, ...]) -> list[tuple[str, str]]:
     found = []
     for text in texts:
         name, sign, value = text.partition("=")
+        if not sign and whole:
+            sign, value = "=", whole
         if not (sign and name.strip() and value.strip()):
             raise OptionError(f"`{option}` {text!r}: expected a name, an equals sign and a value")
         found.append((name.strip(), value.strip()))

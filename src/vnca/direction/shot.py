@@ -121,7 +121,7 @@ class Shot:
             value = getattr(asked, name)
             if isinstance(value, str):
                 yield name, rebased(value, folder)
-        for name in ("masks", "layers"):
+        for name in ("masks", "style_mix", "layers", "blend"):
             yield name, tuple(_of_entry(each, name, folder) for each in getattr(asked, name))
         if asked.match is not None:
             yield "match", folder / asked.match
@@ -152,9 +152,11 @@ class Shot:
 
 
 def _of_entry(text: str, option: str, folder: Path) -> str:
-    name, _, value = text.partition("=")
+    name, sign, value = text.partition("=")
     there = folder / name.strip()
-    is_file = option == "layers" and there.exists()
+    is_file = option in ("layers", "blend") and there.exists()
+    if not sign:
+        return text
     return f"{there if is_file else name.strip()}={rebased(value.strip(), folder)}"
 
 

@@ -10,11 +10,11 @@ Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from vnca.core import AnyArray, Box, FloatArray, IntArray
+from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
 from vnca.direction import Carried, Direction, Inputs, Moment
@@ -26,9 +26,11 @@ from vnca.engine import Compute, Session, open_session
 from vnca.engine.domain import Domain, DomainKind
 from vnca.io.smoke_format import on_one_lattice
 from vnca.painting.shown import COLOUR_DILATION, Painting, composed
+from vnca.painting.state import Ready, RollState
 from vnca.painting.transport import transported
 from vnca.rule import SMOKE_THRESHOLD, Rule
-from vnca.rule.conditioning import priors
+from vnca.rule.conditioning import in_shares, priors
+from vnca.rule.mixing import blended
 from vnca.rule.paint import (
     Between,
     colour_means,
@@ -58,55 +60,6 @@ class StylizeConfig(Direction):
 
 
 @dataclass(frozen=True, eq=False)
-class RollState:
-    """What a frame leaves to the next: all it takes to go on from there.
-
-    Attributes:
-        cells: `[n, 3]` index coordinates, in the lattice, of the cells alive; none before the
-            first frame and after one without smoke.
-        values: `[n + 1, C]`, their state and a last row of zeros.
-        steps_done: Steps since the sequence began, by which the next ones are numbered.
-        frame: Number of that frame, if there was one.
-        carried: What goes along with the smoke beside it, where anything does.
-        layers: What the rules of further layers left, of each its own.
-    """
-
-    cells: IntArray
-    values: FloatArray
-    steps_done: int = 0
-    frame: int | None = None
-    carried: Carried | None = None
-    layers: tuple["RollState", ...] = ()
-
-    @classmethod
-    def empty(cls, channels: int, steps_done: int = 0) -> "RollState":
-        """That of nothing painted yet."""
-        cells = np.zeros((0, 3), dtype=np.int32)
-        return cls(cells, np.zeros((1, channels), dtype=np.float32), steps_done)
-
-
-class Ready(NamedTuple):
-    """A frame, with all that painting it takes beside what the frame before it left.
-
-    Attributes:
-        smoke: On a grid as fine as the automaton's.
-        domain: Its active cells.
-        session: The automaton on them; None if there are none.
-        layers: What further layers take, of each its own.
-    """
-
-    smoke: Volume
-    domain: Domain
-    session: Session | None
-    layers: tuple["Ready", ...] = ()
-
-    @property
-    def frame(self) -> int:
-        """Its number in the sequence."""
-        return self.smoke.frame
-
-
-@dataclass(frozen=True, eq=False)
 class Roll:
     """A rule made ready for a sequence.
 
@@ -121,6 +74,8 @@ class Roll:
         finer: How many times as fine as the automaton's the grid of the painting is; what is there
             between the cells, the decoder says.
         layers: The rules of further layers, in the order of `config.layers`.
+        styles: Which of the rule's styles each value of `config.style_mix` is of.
+        blend: The rules whose weights are mixed with its own, in the order of `config.blend`.
         inputs: What the direction of `config` takes beside the smoke.
         editing: What it does with colours as a whole.
     """
@@ -133,6 +88,8 @@ class Roll:
     grid: int = 1
     finer: int = 1
     layers: tuple["Roll", ...] = ()
+    styles: tuple[int, ...] = ()
+    blend: tuple[Rule, ...] = ()
     inputs: Inputs = field(default_factory=Inputs)
     editing: Editing = field(default_factory=Editing)
 
@@ -188,13 +145,14 @@ class Roll:
             GridError: If the smoke lacks what the rule is conditioned on.
         """
         domain = self._domain(smoke)
+        rule = self._rule(smoke)
         layers = tuple(layer.ready(smoke) for layer in self.layers)
         if len(domain) == 0:
-            return Ready(smoke, domain, None, layers)
-        conditioning = priors(domain, smoke, self.rule)
-        automaton = self.rule.automaton(self.config.seed)
+            return Ready(smoke, domain, None, rule, layers=layers)
+        conditioning = priors(domain, smoke, rule)
+        automaton = rule.automaton(self.config.seed)
         session = open_session(automaton, domain, conditioning, self.compute)
-        return Ready(smoke, domain, session, layers)
+        return Ready(smoke, domain, session, rule, conditioning if self.styles else None, layers)
 
     def paint(self, smoke: Volume | Ready, state: RollState) -> Painting:
         """The next frame, of the same lattice, from the state that the one before it left.
@@ -212,6 +170,15 @@ class Roll:
         del ready, smoke  # what follows makes arrays of the same order
         return self._painting(moment, parts, replace(state, carried=moment.carried))
 
+    def _rule(self, smoke: Volume) -> Rule:
+        """The rule with the weights of a frame."""
+        if not self.blend:
+            return self.rule
+        moment, count = Moment(smoke, self.box, inputs=self.inputs), len(self.blend) + 1
+        nowhere = np.zeros((1, 3), np.int32)
+        shares = self.config.mix("blend", range(1, count), count, moment, nowhere)
+        return blended((self.rule, *self.blend), shares)
+
     def _moment(self, smoke: Volume, carried: Carried | None) -> Moment:
         """A frame as the direction is asked about it, and what smoke carried to it."""
         threshold = SMOKE_THRESHOLD * self.rule.scales.density
@@ -222,7 +189,7 @@ class Roll:
         """The state after the steps of a frame, and what is painted, layers over each other."""
         before = state.layers
         state = self._advanced(ready, state, moment)
-        parts = self._parts(ready.domain, state, moment)
+        parts = self._parts(ready, state, moment)
         layers = []
         for number, layer in enumerate(self.layers):
             left, above = layer._stepped(ready.layers[number], before[number], moment)
@@ -234,6 +201,10 @@ class Roll:
     def _advanced(self, ready: Ready, state: RollState, moment: Moment) -> RollState:
         """The state of this rule alone after the steps of a frame."""
         domain, session = ready.domain, ready.session
+        if session is not None and ready.conditioning is not None:
+            count = self.rule.config.style_count
+            shares = self.config.mix("style_mix", self.styles, count, moment, domain.cells)
+            session = session.conditioned(in_shares(ready.conditioning, self.rule, shares))
         if session is None:
             return RollState.empty(self.rule.config.channels, state.steps_done)
         warmup = self.config.warmup if len(state.cells) == 0 else 0
@@ -296,7 +267,7 @@ class Roll:
         )
         return Painting.of_fields(smoke, density, colour, state, moment.smoke, light)
 
-    def _parts(self, domain: Domain, state: RollState, moment: Moment) -> Parts:
+    def _parts(self, ready: Ready, state: RollState, moment: Moment) -> Parts:
         """What is painted by this rule alone.
 
         Of a decoder, each is the mean over a part of a cell: what is finer than the grid of the
@@ -307,7 +278,8 @@ class Roll:
             strength = self.config.value("density_strength", moment, state.cells)
             factors = density_factors(cells, strength=strength)
             return Parts(state.cells, colours(cells), factors)
-        between = Between(self.rule, self.compute.backend, threads=self.compute.threads)
+        domain = ready.domain
+        between = Between(ready.rule, self.compute.backend, threads=self.compute.threads)
         parts = self.finer
         offsets = np.indices(3 * (parts,), np.int32).reshape(3, -1).T
         at = (state.cells[:, None] * parts + offsets).reshape(-1, 3)

@@ -13,6 +13,7 @@ from vnca.engine import Compute, open_session
 from vnca.engine.domain import Domain
 from vnca.rule import Rule
 from vnca.rule.paint import Between, colour_means, colours, parts_of_cells, require_refinement
+from vnca.rule.styles import in_style
 
 SMALLEST, LARGEST = 8, 384
 """Cells along an edge."""
@@ -115,7 +116,8 @@ def grow(
     """Grow a block from nothing, and let it live on: one block after the other, without end.
 
     Args:
-        rule: Cells know nothing but their neighbourhood: its conditioning is zero here.
+        rule: Cells know nothing but their neighbourhood: its conditioning is zero here. One of
+            several styles grows its first.
         size: Cells along an edge.
         steps: Steps before the first block.
         seed: Same seed, same machine, same block.
@@ -124,7 +126,7 @@ def grow(
         watch: Is called after each step.
     """
     compute = compute or Compute()
-    domain = block_domain(size)
+    domain, rule = block_domain(size), in_style(rule)
     nothing = np.zeros((len(domain), rule.config.conditioning_width), np.float32)
     session = open_session(rule.automaton(seed), domain, nothing, compute)
     between = Between(rule, compute.backend, threads=compute.threads)

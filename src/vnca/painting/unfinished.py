@@ -13,7 +13,8 @@ from safetensors.numpy import save
 from vnca.core.errors import FileFormatError, OptionError
 from vnca.core.files import existing_file, whole_file
 from vnca.direction import Carried
-from vnca.painting import Roll, RollState
+from vnca.painting import Roll
+from vnca.painting.state import RollState
 
 _METADATA = "vnca"
 _LONGEST_VALUE = 40

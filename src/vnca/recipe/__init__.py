@@ -6,17 +6,30 @@ which are read back here.
 
 import dataclasses
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import UnionType
-from typing import Any, Literal, Protocol, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Any,
+    Literal,
+    Protocol,
+    TypeAlias,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
+from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import ModelError
 from vnca.core.records import distributed
+from vnca.io.picture import read_style, style_array
 from vnca.io.smoke_format import SmokeFormat
 from vnca.painting import StylizeConfig
-from vnca.rule.model import CONFIG_NAME, Model, from_record
+from vnca.rule.model import CONFIG_NAME, STYLES_TOLD, Model, from_record
+from vnca.rule.styles import names_of
 
 T = TypeVar("T")
 
@@ -80,13 +93,47 @@ PICTURE_CELLS = "picture_cells"
 """What says in a model how many cells wide the rule was shown its picture, the shorter side."""
 
 
+PictureGiven: TypeAlias = str | Path | AnyArray
+"""A picture as it may be given from Python: a file, or linear RGB `[r, c, 3]` from 0 to 1."""
+
+
+def given_pictures(
+    style: PictureGiven | Sequence[PictureGiven],
+) -> tuple[list[Path], list[FloatArray] | None]:
+    """The paths of pictures, and the pictures themselves unless all of them are files."""
+    several: list[Any] = [*style] if isinstance(style, (list, tuple)) else [style]
+    paths = [Path(one) if isinstance(one, (str, Path)) else IN_MEMORY for one in several]
+    if IN_MEMORY not in paths:
+        return paths, None
+    given = zip(several, paths, strict=True)
+    return paths, [style_array(one) if at == IN_MEMORY else read_style(at) for one, at in given]
+
+
+def told_of_styles(paths: Sequence[Path], cells: Sequence[float]) -> dict[str, Any]:
+    """What a model tells of its picture; or of each of several, how wide it was shown, too."""
+    told: dict[str, Any] = {"style": ", ".join(path.name for path in paths)}
+    if len(paths) > 1:
+        several = zip(names_of(paths), paths, cells, strict=True)
+        told[STYLES_TOLD] = [
+            {"name": name, "style": path.name, PICTURE_CELLS: round(width, 2)}
+            for name, path, width in several
+        ]
+    return told
+
+
 def recorded(options: Any) -> dict[str, Any]:
     """The fields of a dataclass, and of those inside it, as JSON values."""
     return dataclasses.asdict(options, dict_factory=_json)
 
 
 def _json(fields: list[tuple[str, Any]]) -> dict[str, Any]:
-    return {name: str(value) if isinstance(value, Path) else value for name, value in fields}
+    return {name: _plain(value) for name, value in fields}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return str(value) if isinstance(value, Path) else value
 
 
 def restored(kind: type[T], values: Mapping[str, Any]) -> T:
@@ -149,7 +196,9 @@ def load(path: str | Path) -> Model:
     folder = path if path.is_dir() else path.parent
     try:
         told = json.loads((folder / CONFIG_NAME).read_text())["inputs"]
-        inputs = {name: Path(where) for name, where in told.items() if isinstance(where, str)}
+        inputs: dict[str, Any] = {n: Path(at) for n, at in told.items() if isinstance(at, str)}
+        if isinstance(others := told.get("more_styles"), list):
+            inputs[STYLES_TOLD] = (inputs["style"], *map(Path, others))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         inputs = {}
     return dataclasses.replace(Model.load(path), inputs=inputs)

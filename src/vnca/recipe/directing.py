@@ -2,24 +2,30 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from vnca.core import FloatArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError
 from vnca.core.files import existing_file
-from vnca.direction import Inputs
+from vnca.direction import Direction, Inputs
 from vnca.direction.colour import Editing
+from vnca.direction.values import Constant
 from vnca.io import SmokeFormat
 from vnca.io.sequence import FrameSequence
 from vnca.io.smoke_format import up_axis_of
 from vnca.painting import Roll
+from vnca.recipe import Watch
 from vnca.rule import Rule
-from vnca.rule.model import Model, load_style, style_names
+from vnca.rule.library import load_style, style_names
+from vnca.rule.mixing import require_blendable
+from vnca.rule.model import Model
+from vnca.rule.styles import style_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,21 +63,75 @@ def directed(
     inputs = Inputs(paths, up, direction.missing)
     if sequence is not None:
         direction.require(inputs)
-    picture = None if model.style is None else srgb_to_linear(model.style / np.float32(255))
+    styles = tuple(style_number(model, n, "style_mix") for n in direction.mixed_names("style_mix"))
+    picture = _picture(model, direction, styles)
     editing = Editing.asked(direction.recolour, direction.match, picture)
     # Layers are told what the first is told, and draw no layers of their own.
-    alone = replace(direction, layers=())
+    alone = replace(direction, layers=(), style_mix=(), blend=())
+    blend = tuple(_blended(name, model) for name in direction.mixed_names("blend"))
     rules = [_layer(name, roll.rule, refine) for name in direction.layer_names]
     layers = tuple(replace(roll, rule=rule, config=alone, inputs=inputs) for rule in rules)
+    roll = replace(roll, styles=styles, blend=blend)
     made = replace(roll, layers=layers, inputs=inputs, editing=editing).refined(refine)
     conditions: dict[str, Any] = {}
     if rules:
         conditions["`layers`"] = [list(direction.layers), [digest(rule) for rule in rules]]
+    if blend:
+        conditions["`blend`"] = [list(direction.blend), [digest(rule) for rule in blend]]
     if files := direction.files(inputs):
         conditions["a file of a mask or a palette"] = [_mark(path) for path in files]
-    if editing.changes and model.style is not None:
-        conditions["the picture of the model"] = hashlib.blake2b(model.style.tobytes()).hexdigest()
+    if editing.changes and picture is not None:
+        conditions["the picture of the model"] = hashlib.blake2b(picture.tobytes()).hexdigest()
     return Directed(made, conditions)
+
+
+def say_styles(model: Model, direction: Direction, watch: Watch) -> None:
+    """Say in which style a model of several paints where none is asked for."""
+    if model.style_names and not direction.style_mix:
+        listed = ", ".join(f"{n} {name}" for n, name in enumerate(model.style_names, 1))
+        watch.note(f"painting in the first of the styles {listed}; `style_mix` asks for others")
+
+
+def _picture(model: Model, direction: Direction, styles: Sequence[int]) -> FloatArray | None:
+    """The picture whose colours are those of the painting, linear RGB; of several, their pixels.
+
+    Raises:
+        OptionError: If a colour is asked for by its number, and there are several pictures.
+    """
+    shown, whole = [0, *styles], direction.mixes["style_mix"] == (Constant(1.0),)
+    thumbnails = dict(enumerate(model.thumbnails))
+    pictures = [thumbnails[n] for n in sorted(set(shown[whole:])) if n in thumbnails]
+    numbered = [text for text in direction.recolour if not text.startswith("#")]
+    if len(pictures) > 1 and numbered:
+        raise OptionError(
+            f"`recolour` {numbered[0]!r}: the painting has the colours of several pictures; name "
+            "the old colour itself, as #1b2a49"
+        )
+    if len(pictures) > 1:
+        pictures = [np.concatenate([each.reshape(-1, 1, 3) for each in pictures])]
+    return srgb_to_linear(pictures[0] / np.float32(255)) if pictures else None
+
+
+def _blended(name: str, first: Model) -> Rule:
+    """The rule of a model whose weights are mixed with those of the first.
+
+    Raises:
+        OptionError: If there is no such model, or it has nothing in common with the first.
+        ModelError: If a file is no model.
+    """
+    model = _model(name, "blend")
+    require_blendable(first, model, f"`blend` {name}")
+    return model.rule
+
+
+def _model(name: str, option: str) -> Model:
+    """A style of the library, or a model by its path."""
+    styles = style_names()
+    if name not in styles and not Path(name).exists():
+        raise OptionError(
+            f"`{option}` {name}: no such file, nor a style of the library ({', '.join(styles)})"
+        )
+    return load_style(name) if name in styles else Model.load(name)
 
 
 def _layer(name: str, first: Rule, refine: int) -> Rule:
@@ -81,12 +141,7 @@ def _layer(name: str, first: Rule, refine: int) -> Rule:
         OptionError: If there is no such style or model, or it cannot be laid over the first.
         ModelError: If a file is no model.
     """
-    styles = style_names()
-    if name not in styles and not Path(name).exists():
-        raise OptionError(
-            f"`layers` {name}: no such file, nor a style of the library ({', '.join(styles)})"
-        )
-    model = load_style(name) if name in styles else Model.load(name)
+    model = _model(name, "layers")
     if refine > 1 and (model.rule.decoder is None) is not (first.decoder is None):
         raise OptionError(
             f"`layers` {name}: of it and the first rule only one has a decoder, so they run on "

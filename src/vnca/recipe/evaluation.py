@@ -16,6 +16,7 @@ from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.core.files import whole_file, writable_folder
 from vnca.core.lattice import Region
 from vnca.core.volume import Volume
+from vnca.direction.values import Constant
 from vnca.engine import Compute, compute_of
 from vnca.features import load_network
 from vnca.io import SmokeFormat, with_fitted_scale
@@ -34,6 +35,7 @@ from vnca.recipe import PICTURE_CELLS, SILENT, Watch, applied, tracked
 from vnca.recipe.sequence import open_sequence, placed, region_of, sequence_region, volumes
 from vnca.rule.model import Model
 from vnca.rule.paint import require_refinement
+from vnca.rule.styles import alone, style_number
 
 REPORT_NAME = "report.html"
 MEASURES_NAME = "report.json"
@@ -228,6 +230,7 @@ def run(
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
+    options, model = _of_one_style(options, model)
     compute = compute_of(options.backend, options.device)
     out = None if options.out is None else writable_folder(options.out)
     picture = _picture(options, model)
@@ -328,6 +331,20 @@ def _judges(model: Model, metric: StyleMetric, size: int) -> list[Judge]:
         trained_with = None if origin is None else origin == network.origin
         found.append(Judge.of(network, trained_with, metric, size))
     return found
+
+
+def _of_one_style(options: EvaluateRun, model: Model) -> tuple[EvaluateRun, Model]:
+    """What is measured by one picture: a style of a model of several as a model of its own."""
+    config = options.config
+    for name in ("layers", "blend"):
+        if getattr(config, name):
+            raise OptionError(f"`{name}`: what is measured is one rule; leave it out")
+    names, asked = config.mixed_names("style_mix"), config.mixes["style_mix"]
+    if asked not in ((), (Constant(1.0),)):
+        raise OptionError("`style_mix`: what is measured is one style; name it alone")
+    number = style_number(model, names[0], "style_mix") if names else 0
+    config = dataclasses.replace(config, style_mix=())
+    return dataclasses.replace(options, config=config), alone(model, number)
 
 
 def _picture(options: EvaluateRun, model: Model) -> FloatArray:

@@ -26,7 +26,8 @@ from vnca.recipe.film import FilmConfig
 from vnca.recipe.rendering import CELL_OPACITY
 from vnca.recipe.sequence import open_sequence
 from vnca.rule import SMOKE_THRESHOLD, density_scale, gamma_for_cell_opacity
-from vnca.rule.model import MODEL_NAME, Model, load_style, require_style
+from vnca.rule.library import load_style, require_style
+from vnca.rule.model import MODEL_NAME, Model
 
 COMMAND = "paint"
 RUN, PAINTED, FILM = "run", "painted", "film.mp4"

@@ -22,7 +22,7 @@ from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.painting import Roll, StylizeConfig
 from vnca.painting.painter import OnError, Painter
 from vnca.recipe import Watch, recorded
-from vnca.recipe.directing import digest, directed
+from vnca.recipe.directing import digest, directed, say_styles
 from vnca.recipe.film import Film, FilmConfig, Shown
 from vnca.recipe.sequence import (
     open_sequence,
@@ -137,6 +137,7 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
     ready = directed(
         Roll(rule, options.config, region.box, compute), model, options.refine, sequence, smoke
     )
+    say_styles(model, options.config, watch)
     roll = ready.roll
     facts = _facts(options, model, roll)
     painter = Painter(

@@ -1,7 +1,7 @@
 """A training in the folder of its run, whatever it is trained on: begun, interrupted, resumed."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -20,6 +20,7 @@ from vnca.core.errors import (
 from vnca.features import FeatureNetwork
 from vnca.io.picture import resize, to_srgb8
 from vnca.recipe import PICTURE_CELLS, Watch, recorded, restored
+from vnca.rule.mixing import ORIGINS
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.config import TrainingConfig
@@ -81,7 +82,7 @@ class Session:
         command: The command that begins it or goes on with it, without `vnca`.
         trainer: What is trained.
         folder: Where models, previews and checkpoints go.
-        style: The picture, linear RGB `[r, c, 3]`.
+        styles: The pictures, linear RGB `[r, c, 3]`.
         training: What the model file tells of where it comes from.
         inputs: What `fingerprints` gave.
         asked: What was asked for, as JSON values.
@@ -92,7 +93,7 @@ class Session:
     command: str
     trainer: Trainer
     folder: RunFolder | NoFolder
-    style: FloatArray
+    styles: Sequence[FloatArray]
     training: dict[str, Any]
     inputs: Mapping[str, str]
     asked: Mapping[str, Any]
@@ -109,7 +110,7 @@ class Session:
         network: FeatureNetwork,
         *,
         folder: RunFolder | NoFolder,
-        style: FloatArray,
+        styles: Sequence[FloatArray],
         training: Mapping[str, Any],
         inputs: Mapping[str, str],
         watch: Watch,
@@ -123,7 +124,7 @@ class Session:
             trainer: See above.
             network: What compares pictures.
             folder: See above.
-            style: See above.
+            styles: See above.
             training: What the model file tells beside the network and the size of the picture.
             inputs: See above.
             watch: See above.
@@ -132,7 +133,7 @@ class Session:
             command,
             trainer,
             folder,
-            style,
+            styles,
             {**training, **shown_and_judged(trainer, network)},
             inputs,
             asked(kind, options),
@@ -155,7 +156,8 @@ class Session:
         with self.folder:
             if checkpoint is None:
                 self._keep()
-            inputs = {name: self.asked[name] for name in ("frame", "style") if name in self.asked}
+            known = ("frame", "style", "more_styles")
+            inputs = {name: self.asked[name] for name in known if self.asked.get(name)}
             facts = {**self.training, "inputs": inputs, FINGERPRINTS: self.inputs}
             self.folder.start(trainer.config, facts)
             self.watch.note(
@@ -163,9 +165,11 @@ class Session:
                 f"features '{self.training['features']}', {self.training['device']}"
             )
             chosen = "" if trainer.config.appearance.style_scale else ", chosen by its strokes"
+            cells = ", ".join(f"{cells:.0f}" for cells in trainer.picture_cells)
+            scales = " ".join(f"{one.style_scale:.2f}" for one in trainer.appearances)
+            what = "the picture is" if len(self.styles) == 1 else "the pictures are"
             self.watch.note(
-                f"the picture is {trainer.picture_cells:.0f} cells wide{chosen} "
-                f"(`appearance.style_scale` {trainer.style_scale:.2f})"
+                f"{what} {cells} cells wide{chosen} (`appearance.style_scale` {scales})"
             )
             for note in notes:
                 self.watch.note(note)
@@ -236,7 +240,7 @@ class Session:
         """Write the model and a preview."""
         self._save()
         if self.folder.path is not None:
-            self.folder.preview(preview_sheet(self.trainer, self.style), self.trainer.iteration)
+            self.folder.preview(preview_sheet(self.trainer, *self.styles), self.trainer.iteration)
 
     def _save(self) -> None:
         """Write the model."""
@@ -244,7 +248,10 @@ class Session:
 
     def _model(self) -> Model:
         provenance = {**self.training, "iterations": self.trainer.iteration}
-        return Model(self.trainer.rule(), provenance, _small(self.style))
+        if self.trainer.origins:
+            provenance[ORIGINS] = list(self.trainer.origins)
+        style, *others = map(_small, self.styles)
+        return Model(self.trainer.rule(), provenance, style, more_styles=tuple(others))
 
     def _rollback(self) -> str:
         trainer = self.trainer
@@ -333,14 +340,15 @@ def asked(kind: type[TrainingOptions], options: Any) -> dict[str, Any]:
     if Path(config.features).suffix:  # else a name
         config = dataclasses.replace(config, features=str(Path(config.features).absolute()))
     given = {field.name: getattr(options, field.name) for field in dataclasses.fields(kind)}
-    paths = {name: value.absolute() for name, value in given.items() if isinstance(value, Path)}
+    paths: dict[str, Any] = {n: v.absolute() for n, v in given.items() if isinstance(v, Path)}
+    paths["more_styles"] = tuple(path.absolute() for path in given["more_styles"])
     return recorded(kind(**{**given, **paths, "config": config}))
 
 
 def shown_and_judged(trainer: Trainer, network: FeatureNetwork) -> dict[str, Any]:
     """What a model file tells of how large its picture was shown, and of what compared with it."""
     return {
-        PICTURE_CELLS: round(trainer.picture_cells, 2),
+        PICTURE_CELLS: round(trainer.picture_cells[0], 2),
         "features": network.name,
         "features_origin": network.origin,
         "features_dtype": str(network.dtype).removeprefix("torch."),

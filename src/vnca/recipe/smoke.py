@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from vnca.core import AnyArray, FloatArray
+from vnca.core import FloatArray
 from vnca.core.errors import GridError, OptionError
 from vnca.core.files import remove_file
 from vnca.core.lattice import Lattice
@@ -15,9 +15,18 @@ from vnca.core.volume import Volume
 from vnca.engine.tensors import choose_device, require_equal_runs
 from vnca.features import FeatureNetwork, load_network
 from vnca.io import SmokeFormat, missing_velocity
-from vnca.io.picture import read_style, style_array
+from vnca.io.picture import read_style
 from vnca.io.smoke_format import NO_VELOCITY, on_lattice
-from vnca.recipe import IN_MEMORY, SILENT, Watch, load, texture
+from vnca.recipe import (
+    IN_MEMORY,
+    SILENT,
+    PictureGiven,
+    Watch,
+    given_pictures,
+    load,
+    texture,
+    told_of_styles,
+)
 from vnca.recipe.sequence import beside, read_alone
 from vnca.recipe.session import (
     ResumeOptions,
@@ -27,14 +36,20 @@ from vnca.recipe.session import (
     interrupted,
     run_folder,
 )
-from vnca.recipe.texture import pretraining_config, rule_to_go_on_with, without_prior_weights
-from vnca.rule import Rule
-from vnca.rule.model import MODEL_NAME, Model
+from vnca.recipe.texture import (
+    begin_with_model,
+    of_own_scale,
+    pretraining_config,
+    without_prior_weights,
+)
+from vnca.rule.mixing import origins
+from vnca.rule.model import MODEL_NAME, STYLES_TOLD, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import SmokeConfig, TextureConfig
 from vnca.training.presets import DEFAULT
 from vnca.training.presets import preset as preset_of
 from vnca.training.rollout import memory_budget
+from vnca.training.styles import shared_out, told_styles
 from vnca.training.terms import Term
 from vnca.training.trainers import smoke_trainer
 
@@ -54,6 +69,9 @@ class SmokeRun(TrainingOptions):
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
     style: Path
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
+    more_styles: tuple[Path, ...] = ()
+    """Further pictures, up to eight in all: the rule learns them all and mixes them as it is told
+    when it paints (`style_mix`). For K pictures there are √K times as many iterations."""
     preset: str = DEFAULT
     """Values of all hyperparameters that are not given: draft, standard, paper, or a TOML file."""
     init: Path | None = None
@@ -73,11 +91,13 @@ class ResumeSmokeRun(ResumeOptions):
     """The frame, if it is no longer where it was."""
     style: Path | None = None
     """The picture, if it is no longer where it was."""
+    more_styles: tuple[Path, ...] | None = None
+    """The further pictures, if they are no longer where they were."""
 
 
 def train(
     frame: str | Path | Volume,
-    style: str | Path | AnyArray,
+    style: PictureGiven | Sequence[PictureGiven],
     *,
     out: str | Path | None = None,
     preset: str | Path = DEFAULT,
@@ -95,7 +115,8 @@ def train(
 
     Args:
         frame: A file of smoke, or a volume with velocity in cells a frame.
-        style: A picture file, or an array `[r, c, 3]` of linear RGB from 0 to 1.
+        style: A picture file, or an array `[r, c, 3]` of linear RGB from 0 to 1; or a list of up to
+            eight, which the rule learns all.
         out: Folder for the model, checkpoints, previews and loss curves. Unless given, nothing is
             written, and a training that is cancelled is lost.
         preset: `draft` takes minutes, `standard` a night on a laptop; `paper` is the paper's. Or
@@ -123,10 +144,11 @@ def train(
         raise OptionError(TEXTURE_OR_INIT)
     smoke, config = distributed(options, SmokeFormat(), preset_of(SmokeConfig, preset))
     volume = frame if isinstance(frame, Volume) else None
-    picture = None if isinstance(style, (str, Path)) else style_array(style)
+    (first, *others), pictures = given_pictures(style)
     asked = SmokeRun(
         frame=IN_MEMORY if isinstance(frame, Volume) else Path(frame),
-        style=Path(style) if isinstance(style, (str, Path)) else IN_MEMORY,
+        style=first,
+        more_styles=tuple(others),
         out=None if out is None else Path(out),
         preset=str(preset),
         init=None if init is None else Path(init),
@@ -145,10 +167,11 @@ def train(
                 resume=asked.out,
                 frame=asked.frame,
                 style=asked.style,
+                more_styles=asked.more_styles,
                 memory_budget=memory_budget,
             )
-            return resume_run(again, watch, volume=volume, picture=picture, terms=terms)
-    return run(asked, watch, volume=volume, picture=picture, terms=terms)
+            return resume_run(again, watch, volume=volume, pictures=pictures, terms=terms)
+    return run(asked, watch, volume=volume, pictures=pictures, terms=terms)
 
 
 def run(
@@ -157,7 +180,7 @@ def run(
     *,
     checkpoint: Checkpoint | None = None,
     volume: Volume | None = None,
-    picture: FloatArray | None = None,
+    pictures: Sequence[FloatArray] | None = None,
     terms: Sequence[Term] = (),
 ) -> Model:
     """Train as asked, or go on from a checkpoint.
@@ -167,7 +190,7 @@ def run(
         watch: Is told how far it has come.
         checkpoint: Where the training was left.
         volume: The frame, if it need not be read.
-        picture: The style picture, linear RGB `[r, c, 3]`, if it need not be read.
+        pictures: The style pictures, linear RGB `[r, c, 3]`, if they need not be read.
         terms: Further terms of the loss on smoke.
 
     Raises:
@@ -175,7 +198,7 @@ def run(
             diverges, or memory runs out.
     """
     folder = run_folder(options.out, overwrite=options.overwrite, checkpoint=checkpoint)
-    style = read_style(options.style) if picture is None else picture
+    styles = pictures or [read_style(path) for path in (options.style, *options.more_styles)]
     device = choose_device(options.device)
     if volume is None:
         smoke_format = beside(options.frame, options.smoke)
@@ -187,7 +210,9 @@ def run(
         raise GridError(
             f"{options.frame}: there is no smoke in this frame to train on; choose a later one"
         )
-    config = options.config
+    config = shared_out(told_styles(options.config, styles), len(styles))
+    if len(styles) > 1:
+        watch.note(f"{len(styles)} styles: {config.iterations} iterations")
     if smoke.velocity is None:
         if smoke_format.velocity_grid != NO_VELOCITY:
             watch.note(f"{missing_velocity(options.frame)}; the rule learns nothing of motion")
@@ -200,11 +225,11 @@ def run(
     with fitting(config, "this frame"):
         budget = memory_budget(options.memory_budget)
         trainer = smoke_trainer(
-            smoke, style, config, network, device=device, memory_budget=budget, terms=terms
+            smoke, styles, config, network, device=device, memory_budget=budget, terms=terms
         )
     training = {
         "frame": options.frame.name,
-        "style": options.style.name,
+        **told_of_styles((options.style, *options.more_styles), trainer.picture_cells),
         "preset": Path(options.preset).name,
         "seed": config.seed,
         "device": str(device),
@@ -217,24 +242,26 @@ def run(
         trainer,
         network,
         folder=folder,
-        style=style,
+        styles=styles,
         training=training,
-        inputs=training_inputs(smoke, style, config, network, terms),
+        inputs=training_inputs(smoke, styles, config, network, terms),
         watch=watch,
     )
     if checkpoint is None or not checkpoint.training:
         if checkpoint is not None:
             checkpoint.require(session.inputs, folder.checkpoint_path)
-        texture_config = pretraining_config(config, trainer.picture_cells)
+        texture_config = pretraining_config(options.config, trainer.picture_cells[0])
         if options.init is not None:
-            trainer.begin_with(rule_to_go_on_with(options.init, trainer.rule()))
+            begin_with_model(trainer, options.init)
         elif texture_config is not None:
             if checkpoint is None and options.overwrite and options.out is not None:
                 # Resuming must not take the texture of the run that was there for this one's.
                 remove_file(options.out / TEXTURE_FOLDER / MODEL_NAME)
             folder.reserve(Checkpoint({}, session.inputs, COMMAND, session.asked))
-            rule = _texture(options, texture_config, style, watch, goes_on=checkpoint is not None)
-            trainer.begin_with(without_prior_weights(rule))
+            if len(styles) > 1 and config.appearance.style_scale is None:
+                texture_config = of_own_scale(texture_config)
+            model = _texture(options, texture_config, styles, watch, goes_on=checkpoint is not None)
+            trainer.begin_with(without_prior_weights(model.rule), origins(model))
         checkpoint = None
     notes = []
     if config.motion.weight and smoke.velocity is not None and not trainer.teaches_motion:
@@ -242,14 +269,16 @@ def run(
     model = session.run(checkpoint, *notes)
     inputs = {
         "frame": options.frame if volume is None else volume,
-        "style": options.style if picture is None else picture,
+        "style": options.style if pictures is None else pictures[0],
     }
+    if options.more_styles:
+        inputs[STYLES_TOLD] = pictures or (options.style, *options.more_styles)
     return dataclasses.replace(model, inputs=inputs)
 
 
 def training_inputs(
     smoke: Volume,
-    style: FloatArray,
+    style: FloatArray | Sequence[FloatArray],
     config: SmokeConfig,
     network: FeatureNetwork,
     terms: Sequence[Term] = (),
@@ -265,16 +294,17 @@ def training_inputs(
 def _texture(
     options: SmokeRun,
     config: TextureConfig,
-    style: FloatArray,
+    styles: Sequence[FloatArray],
     watch: Watch,
     *,
     goes_on: bool,
-) -> Rule:
+) -> Model:
     """The texture to begin with, from the folder in the run's where it is, or may be already."""
-    picture = style if options.style == IN_MEMORY else None
+    pictures = styles if IN_MEMORY in (options.style, *options.more_styles) else None
     out = None if options.out is None else options.out / TEXTURE_FOLDER
     asked = texture.TextureRun(
         style=options.style,
+        more_styles=options.more_styles,
         config=config,
         out=out,
         overwrite=options.overwrite or goes_on,
@@ -284,20 +314,23 @@ def _texture(
     )
     if out is None:
         watch.note("first, a solid texture")
-        return texture.run(asked, watch, picture=picture).rule
+        return texture.run(asked, watch, pictures=pictures)
     watch.note(f"first, a solid texture: {out}")
     try:
         if goes_on and (out / CHECKPOINT_NAME).exists():
             again = texture.ResumeTextureRun(
-                resume=out, style=options.style, memory_budget=options.memory_budget
+                resume=out,
+                style=options.style,
+                more_styles=options.more_styles,
+                memory_budget=options.memory_budget,
             )
-            texture.resume_run(again, watch, picture=picture)
+            texture.resume_run(again, watch, pictures=pictures)
         elif not (goes_on and (out / MODEL_NAME).exists()):
-            texture.run(asked, watch, picture=picture)
+            texture.run(asked, watch, pictures=pictures)
     except KeyboardInterrupt:
         watch.note(f"to go on with all of it: vnca {COMMAND} `resume` {options.out}")
         raise
-    return Model.load(out).rule
+    return Model.load(out)
 
 
 def resume_run(
@@ -305,7 +338,7 @@ def resume_run(
     watch: Watch,
     *,
     volume: Volume | None = None,
-    picture: FloatArray | None = None,
+    pictures: Sequence[FloatArray] | None = None,
     terms: Sequence[Term] = (),
 ) -> Model:
     """Go on with a training, if there is something left to do; see `run` for the arguments.
@@ -317,4 +350,4 @@ def resume_run(
     if left is None:
         return load(options.resume)
     begun, checkpoint = left
-    return run(begun, watch, checkpoint=checkpoint, volume=volume, picture=picture, terms=terms)
+    return run(begun, watch, checkpoint=checkpoint, volume=volume, pictures=pictures, terms=terms)

@@ -19,7 +19,7 @@ from vnca.painting import Painting, Roll, painted
 from vnca.painting.frames import VelocityCheck, require_dense
 from vnca.painting.painter import OnError
 from vnca.recipe import SILENT, Watch, applied, tracked
-from vnca.recipe.directing import directed
+from vnca.recipe.directing import directed, say_styles
 from vnca.recipe.film import FilmConfig, Shown
 from vnca.recipe.painting import StylizeRun, read_painted, run
 from vnca.recipe.sequence import (
@@ -188,6 +188,7 @@ def _in_memory(
     compute = compute_of(options.backend, options.device, options.precision)
     roll = Roll(rule, options.config, region.box, compute)
     roll = directed(roll, model, options.refine, sequence, smoke).roll
+    say_styles(model, options.config, watch)
     refined = rule.refined(options.refine)
 
     def frame(painting: Painting) -> PaintedFrame:

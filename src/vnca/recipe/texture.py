@@ -21,10 +21,10 @@ from vnca.engine.automaton import FILTERS
 from vnca.engine.tensors import choose_device, require_equal_runs
 from vnca.features import load_network
 from vnca.io.mesh import Mesh, read_mesh
-from vnca.io.picture import read_style, style_array
+from vnca.io.picture import read_style
 from vnca.io.smoke_format import UpAxis
 from vnca.painting.block import KIND
-from vnca.recipe import IN_MEMORY, SILENT, Watch
+from vnca.recipe import SILENT, PictureGiven, Watch, given_pictures, told_of_styles
 from vnca.recipe.session import (
     ResumeOptions,
     Session,
@@ -34,13 +34,18 @@ from vnca.recipe.session import (
     run_folder,
 )
 from vnca.rule import Rule
-from vnca.rule.model import Model, load_style, nearest_style, style_names
+from vnca.rule.conditioning import STYLES
+from vnca.rule.library import load_style, nearest_style, style_names
+from vnca.rule.mixing import origins
+from vnca.rule.model import Model
+from vnca.rule.styles import in_style
 from vnca.training.checkpoint import Checkpoint, fingerprints
 from vnca.training.config import SmokeConfig, TextureConfig
 from vnca.training.loop import Trainer
 from vnca.training.presets import DEFAULT
 from vnca.training.presets import preset as preset_of
 from vnca.training.rollout import memory_budget
+from vnca.training.styles import shared_out, told_styles
 from vnca.training.trainers import texture_trainer
 
 AUTO = "auto"
@@ -83,8 +88,16 @@ def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | N
     )
 
 
+def of_own_scale(config: TextureConfig) -> TextureConfig:
+    """The same with every picture as wide as its own strokes ask for."""
+    appearance = dataclasses.replace(config.appearance, style_scale=None)
+    return dataclasses.replace(config, appearance=appearance)
+
+
 def without_prior_weights(rule: Rule, conditioning: Sequence[str] | None = None) -> Rule:
     """The rule with no weight on any prior: a texture has had none to learn what they mean.
+
+    It keeps what it has learnt of as many styles; a rule of one begins with all of them alike.
 
     Args:
         rule: A texture.
@@ -93,33 +106,38 @@ def without_prior_weights(rule: Rule, conditioning: Sequence[str] | None = None)
     config = rule.config
     if conditioning is not None:
         config = dataclasses.replace(config, conditioning=tuple(conditioning))
+    if rule.config.style_count != config.style_count:
+        rule = in_style(rule)
     perceived = FILTERS * config.channels
     hidden = np.zeros((config.hidden, config.inputs), np.float32)
     hidden[:, :perceived] = rule.hidden[:, :perceived]
+    if count := rule.config.style_count:
+        hidden[:, -count:] = rule.hidden[:, -count:]
     return dataclasses.replace(rule, hidden=hidden, config=config)
 
 
-def rule_to_go_on_with(path: Path, wanted: Rule) -> Rule:
-    """The rule of a model that a training on smoke begins with.
+def begin_with_model(trainer: Trainer, path: Path) -> None:
+    """Let a training on smoke begin with a model.
 
     A rule of smoke keeps what it has learnt of priors; a texture has had none.
 
     Args:
+        trainer: Before its first iteration.
         path: Of the model, or of the folder of its run.
-        wanted: What its weights are to fit.
 
     Raises:
         VncaError: If it cannot be read, or is a rule of another shape.
     """
-    rule = Model.load(path).rule
+    model, wanted = Model.load(path), trainer.rule()
+    rule, its = model.rule, model.rule.config
     misfit = _misfit(rule, wanted)
     if misfit is not None:
         raise OptionError(f"`init` {path}: {misfit}")
-    its = rule.config
-    knows_smoke = any(its.is_conditioned_on(name) for name in its.conditioning)
-    if knows_smoke and its.conditioning == wanted.config.conditioning:
-        return rule
-    return without_prior_weights(rule, wanted.config.conditioning)
+    known = (name for name in its.conditioning if name not in STYLES)
+    knows_smoke = any(map(its.is_conditioned_on, known))
+    if not (knows_smoke and its.conditioning == wanted.config.conditioning):
+        rule = without_prior_weights(rule, wanted.config.conditioning)
+    trainer.begin_with(rule, origins(model))
 
 
 def _misfit(rule: Rule, wanted: Rule) -> str | None:
@@ -158,20 +176,21 @@ def graft(
     if source in (AUTO, *style_names()):
         is_auto = source == AUTO
         name = nearest_style(linear_to_srgb(style.clip(0, 1))) if is_auto else source
-        rule = load_style(name).rule
-        misfit = _misfit(rule, wanted)
+        model = load_style(name)
+        misfit = _misfit(model.rule, wanted)
         if is_auto and misfit is not None:
             watch.note("no style of the library has such a rule; training starts from nothing")
             return None
         what = f"`graft` {name}"
     else:
-        rule, name = Model.load(Path(source)).rule, Path(source).name
-        misfit, what = _misfit(rule, wanted), f"`graft` {source}"
+        model, name = Model.load(Path(source)), Path(source).name
+        misfit, what = _misfit(model.rule, wanted), f"`graft` {source}"
     if misfit is not None:
         raise OptionError(f"{what}: {misfit}")
     if not goes_on:
         watch.note(f"starting from the rule of {name}")
-        trainer.begin_with(without_prior_weights(rule, wanted.config.conditioning))
+        rule = without_prior_weights(model.rule, wanted.config.conditioning)
+        trainer.begin_with(rule, origins(model))
     return name
 
 
@@ -184,6 +203,9 @@ class TextureRun(TrainingOptions):
 
     style: Path
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
+    more_styles: tuple[Path, ...] = ()
+    """Further pictures, up to eight in all: the rule learns them all and mixes them as it is told
+    when it paints (`style_mix`). For K pictures there are √K times as many iterations."""
     mesh: Path | None = None
     """Look at this mesh too while training: GLB, OBJ, PLY or STL."""
     up_axis: UpAxis | None = None
@@ -200,12 +222,14 @@ class ResumeTextureRun(ResumeOptions):
 
     style: Path | None = None
     """The picture, if it is no longer where it was."""
+    more_styles: tuple[Path, ...] | None = None
+    """The further pictures, if they are no longer where they were."""
     mesh: Path | None = None
     """The mesh, if it is no longer where it was."""
 
 
 def texture(
-    style: str | Path | AnyArray,
+    style: PictureGiven | Sequence[PictureGiven],
     *,
     out: str | Path | None = None,
     mesh: str | Path | None = None,
@@ -221,7 +245,8 @@ def texture(
     """Learn a solid texture from one picture, as `vnca texture train` does.
 
     Args:
-        style: A picture file, or an array `[r, c, 3]` of linear RGB from 0 to 1.
+        style: A picture file, or an array `[r, c, 3]` of linear RGB from 0 to 1; or a list of up to
+            eight, which the rule learns all.
         out: Folder for the model, checkpoints, previews and loss curves; nothing is written unless
             given.
         mesh: A mesh file to look at, too, while training.
@@ -239,9 +264,10 @@ def texture(
             memory runs out.
     """
     (config,) = distributed(options, preset_of(TextureConfig, preset))
-    is_file = isinstance(style, (str, Path))
+    (first, *others), pictures = given_pictures(style)
     asked = TextureRun(
-        style=Path(style) if is_file else IN_MEMORY,
+        style=first,
+        more_styles=tuple(others),
         out=None if out is None else Path(out),
         mesh=None if mesh is None else Path(mesh),
         up_axis=up_axis,
@@ -252,7 +278,7 @@ def texture(
         memory_budget=memory_budget,
         config=config,
     )
-    return run(asked, watch, picture=None if is_file else style_array(style))
+    return run(asked, watch, pictures=pictures)
 
 
 def run(
@@ -260,7 +286,7 @@ def run(
     watch: Watch,
     *,
     checkpoint: Checkpoint | None = None,
-    picture: FloatArray | None = None,
+    pictures: Sequence[FloatArray] | None = None,
 ) -> Model:
     """Train as asked, or go on from a checkpoint.
 
@@ -268,29 +294,31 @@ def run(
         options: What is asked.
         watch: Is told how far it has come.
         checkpoint: Where the training was left.
-        picture: The style picture, linear RGB `[r, c, 3]`, if it need not be read.
+        pictures: The style pictures, linear RGB `[r, c, 3]`, if they need not be read.
 
     Raises:
         VncaError: If an input cannot be used, the run folder cannot be written, training
             diverges, or memory runs out.
     """
     folder = run_folder(options.out, overwrite=options.overwrite, checkpoint=checkpoint)
-    style = read_style(options.style) if picture is None else picture
+    styles = pictures or [read_style(path) for path in (options.style, *options.more_styles)]
     device = choose_device(options.device)
     mesh = read_mesh(options.mesh, options.up_axis) if options.mesh else None
-    config = options.config
+    config = shared_out(told_styles(options.config, styles), len(styles))
+    if len(styles) > 1:
+        watch.note(f"{len(styles)} styles: {config.iterations} iterations")
     require_equal_runs(device)
     network = load_network(config.features, device)
     with fitting(config, "this block"):
         budget = memory_budget(options.memory_budget)
         trainer = texture_trainer(
-            style, config, network, mesh=mesh, device=device, memory_budget=budget
+            styles, config, network, mesh=mesh, device=device, memory_budget=budget
         )
     has_begun = checkpoint is not None and bool(checkpoint.training)
-    started_from = graft(trainer, config.graft, style, watch, goes_on=has_begun)
+    started_from = graft(trainer, config.graft, styles[0], watch, goes_on=has_begun)
     training = {
         "kind": KIND,
-        "style": options.style.name,
+        **told_of_styles((options.style, *options.more_styles), trainer.picture_cells),
         "mesh": options.mesh.name if options.mesh else None,
         "graft": started_from,
         "preset": Path(options.preset).name,
@@ -305,16 +333,16 @@ def run(
         trainer,
         network,
         folder=folder,
-        style=style,
+        styles=styles,
         training=training,
-        inputs=fingerprints(style, config, network, mesh=_surfaces(mesh)),
+        inputs=fingerprints(styles, config, network, mesh=_surfaces(mesh)),
         watch=watch,
     )
     return session.run(checkpoint)
 
 
 def resume_run(
-    options: ResumeTextureRun, watch: Watch, *, picture: FloatArray | None = None
+    options: ResumeTextureRun, watch: Watch, *, pictures: Sequence[FloatArray] | None = None
 ) -> Model:
     """Go on with a training, if there is something left to do; see `run` for the arguments.
 
@@ -325,7 +353,7 @@ def resume_run(
     if left is None:
         return Model.load(options.resume)
     begun, checkpoint = left
-    return run(begun, watch, checkpoint=checkpoint, picture=picture)
+    return run(begun, watch, checkpoint=checkpoint, pictures=pictures)
 
 
 def _surfaces(mesh: Mesh | None) -> list[AnyArray]:

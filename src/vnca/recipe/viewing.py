@@ -24,15 +24,9 @@ from vnca.recipe.sequence import (
 )
 from vnca.recipe.simulation import simulate
 from vnca.rule.conditioning import conditioning_named
-from vnca.rule.model import (
-    CONFIG_NAME,
-    MODEL_NAME,
-    Model,
-    load_style,
-    style_bytes,
-    style_names,
-    style_thumbnail,
-)
+from vnca.rule.library import load_style, style_bytes, style_names, style_thumbnail
+from vnca.rule.model import CONFIG_NAME, MODEL_NAME, Model
+from vnca.rule.styles import alone
 from vnca.viewer import RUN_NAME, SMOKE_NAME, Show, ShownRule, contents, model_name
 from vnca.viewer.server import Content, PageServer
 from vnca.viewer.site import export
@@ -166,7 +160,10 @@ def _of_run(folder: Path, blank: bytes) -> dict[str, Content]:
     path = folder / MODEL_NAME
 
     def model() -> bytes:
-        return path.read_bytes() if path.exists() else blank
+        if not path.exists():
+            return blank
+        several = Model.load(path, to_describe=True).style_names
+        return alone(Model.load(path)).encoded() if several else path.read_bytes()
 
     return {model_name(0): model, RUN_NAME: lambda: progress(folder)}
 
@@ -239,7 +236,14 @@ def _rules(given: Model | None, options: ViewRun) -> list[ShownRule]:
     path = Path(options.model or "")
     path = path / MODEL_NAME if path.is_dir() else path
     name = path.parent.resolve().name if path.name == MODEL_NAME else path.stem
-    return [ShownRule(name, str(given.training.get("style", "")), path.read_bytes()), *rules]
+    # The page mixes rules of a single style.
+    parts = {f"{name}_{style}": alone(given, n) for n, style in enumerate(given.style_names)}
+    several = [
+        ShownRule(title, str(part.training.get("style", "")), part.encoded())
+        for title, part in parts.items()
+    ]
+    sole = ShownRule(name, str(given.training.get("style", "")), path.read_bytes())
+    return [*(several or [sole]), *rules]
 
 
 def _library(first: str) -> list[ShownRule]:

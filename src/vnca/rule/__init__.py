@@ -13,7 +13,7 @@ from vnca.core.errors import OptionError, ShapeError
 from vnca.core.lattice import Region
 from vnca.engine.automaton import FILTERS, Automaton, DecoderWeights, Weights, stencil
 from vnca.engine.domain import DomainKind
-from vnca.rule.conditioning import columns, conditioning_named
+from vnca.rule.conditioning import STYLES, columns, conditioning_named
 
 UNITS = 32
 """Of each of its layers, unless it is told otherwise."""
@@ -165,6 +165,12 @@ class RuleConfig:
             raise OptionError(
                 f"`conditioning` {', '.join(self.conditioning)}: expected each of them once"
             )
+        count = self.style_count
+        if count == 1 or (count and self.conditioning[-count:] != STYLES[:count]):
+            raise OptionError(
+                f"`conditioning` {', '.join(self.conditioning)}: expected the shares of two styles "
+                "or more last, from style_1 on"
+            )
         if self.channels < 4:
             raise OptionError(f"`channels` {self.channels}: at least 4 are needed (colour and Δd)")
         if self.hidden < 1:
@@ -187,6 +193,17 @@ class RuleConfig:
     def conditioning_width(self) -> int:
         """Numbers P that a cell is conditioned on, those that are switched off among them."""
         return sum(conditioning_named(name).width for name in self.conditioning)
+
+    @property
+    def style_count(self) -> int:
+        """How many styles it mixes; 0 of a rule of a single style, which is not told it."""
+        return sum(name in STYLES for name in self.conditioning)
+
+    @property
+    def style_columns(self) -> slice | None:
+        """Where in the conditioning `[n, P]` the shares of styles are; None of a single style."""
+        count, width = self.style_count, self.conditioning_width
+        return slice(width - count, width) if count else None
 
     def columns(self, name: str) -> slice | None:
         """Where in the conditioning `[n, P]` an input is; None if it is not there or always 0."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vnca.core import FloatArray
+from vnca.core import AnyArray, FloatArray
 from vnca.core.errors import GridError, OptionError, ShapeError
 from vnca.core.lattice import Placement
 from vnca.core.volume import Volume
@@ -23,6 +23,9 @@ SPEED_LIMIT = 2.0
 and what a rule has not met it paints badly. Nor must a file in other units blow a state up."""
 DENSITY_LIMIT = 4.0
 """Nor on a greater normalised density."""
+STYLES = tuple(f"style_{number}" for number in range(1, 9))
+"""What a rule of several styles is conditioned on: the share of each, all of them together 1. It
+lists as many of them, the first ones in this order, as it has styles."""
 _SQUARABLE = 1e18
 """Single precision holds the square of it."""
 
@@ -128,7 +131,8 @@ def columns(names: Iterable[str]) -> Mapping[str, slice]:
 def priors(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
     """What the cells of a domain are conditioned on: `[n, P]`, the rule's inputs in their order.
 
-    Inputs that the rule switches off, and velocity where the smoke has none, are zero.
+    Inputs that the rule switches off, and velocity where the smoke has none, are zero. A rule of
+    several styles is to paint in its first: see `in_shares` for others.
 
     Raises:
         GridError: If the smoke lacks what the rule is conditioned on.
@@ -148,6 +152,21 @@ def priors(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
             raise GridError(f"frame {smoke.frame}: conditioning {name}: not all finite")
         given[:, where] = values
     return given
+
+
+def in_shares(conditioning: AnyArray, rule: "Rule", shares: AnyArray) -> FloatArray:
+    """What cells are conditioned on, `[n, P]`, of a rule of several styles that is to mix them.
+
+    Args:
+        conditioning: `[n, P]`; it stays as it is.
+        rule: Of K styles.
+        shares: Of each style, together 1: `[K]`, or `[n, K]` where they differ from cell to cell.
+    """
+    where = rule.config.style_columns
+    assert where is not None, "a rule of one style has nothing to mix"
+    mixed = conditioning.copy()
+    mixed[:, where] = shares
+    return mixed
 
 
 def _position(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
@@ -188,6 +207,16 @@ def normalised_velocity(velocity: FloatArray, rule: "Rule") -> FloatArray:
     return given * (SPEED_LIMIT / np.maximum(speed, SPEED_LIMIT))
 
 
+def _share(number: int) -> Callable[[Domain, Volume, "Rule"], FloatArray]:
+    """All of the first style, nothing of the others."""
+
+    def values(domain: Domain, smoke: Volume, rule: "Rule") -> FloatArray:
+        del smoke, rule
+        return np.full((len(domain), 1), number == 0, np.float32)
+
+    return values
+
+
 # To give every rule a further input to choose from, list it here.
 _OWN = {
     each.name: each
@@ -195,6 +224,7 @@ _OWN = {
         Conditioning("position", 3, _position),
         Conditioning("density", 1, _density),
         Conditioning("velocity", 3, _velocity),
+        *(Conditioning(name, 1, _share(number)) for number, name in enumerate(STYLES)),
     )
 }
 _KNOWN = dict(_OWN)

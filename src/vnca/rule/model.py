@@ -1,14 +1,10 @@
-"""The model file: a rule as safetensors with JSON metadata. Data only, never code.
-
-The styles of the library are such files too, which come with the package.
-"""
+"""The model file: a rule as safetensors with JSON metadata. Data only, never code."""
 
 import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -18,34 +14,38 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 import vnca
-from vnca.core import AnyArray, Box, FloatArray
+from vnca.core import Box, FloatArray
 from vnca.core.errors import ModelError, OptionError, ShapeError
 from vnca.core.files import existing_file, whole_file
 from vnca.core.lattice import Lattice, Region
 from vnca.engine.automaton import DecoderWeights
 from vnca.rule import CONDITIONING, Decoder, Rule, RuleConfig, Scales
 from vnca.rule.conditioning import (
+    STYLES,
     Conditioning,
     conditioning_named,
     is_known,
     register_conditioning,
 )
 
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 """The newest that is read. A model is written in the oldest that holds it: 2 with a decoder, 3 if
 it is conditioned on anything else than position, density and velocity, 4 if its state is carried
-along."""
+along, 5 if it mixes several styles."""
 MODEL_NAME = "model.safetensors"
 """Name of the model in a run folder."""
 CONFIG_NAME = "config.json"
 """Name, in a run folder, of what was asked for."""
 
+STYLES_TOLD = "styles"
+"""What a model tells of each style of a rule that mixes several: objects, each with a `name`."""
 FORMER_NAMES = {"reach": "dilation"}
 """What fields of a rule are called that earlier models call otherwise."""
 
 _METADATA = "vnca"
 _WEIGHTS = ("hidden", "bias", "output")
 _STYLE = "style"
+_STYLES = (_STYLE, *(f"{_STYLE}.{number}" for number in range(2, len(STYLES) + 1)))
 _DECODER = tuple(f"decoder.{name}" for name in DecoderWeights._fields)
 _FARTHEST = 1e30  # in the world, or of a cell's size
 _EXACT = 2**53  # whole numbers up to here are floats
@@ -60,7 +60,9 @@ class Model:
     Attributes:
         rule: The rule.
         training: How it came about: style, features, preset, iterations, seed, …; JSON values.
-        style: sRGB thumbnail `[r, c, 3]` of the style picture, uint8, or None.
+        style: sRGB thumbnail `[r, c, 3]` of the style picture, uint8, or None; of a rule that mixes
+            several, that of the first.
+        more_styles: Those of its others.
         version: The `vnca` that wrote the file.
         inputs: What it was trained on, where that is known: under `frame` a path or a `Volume`,
             under `style` a path or an array `[r, c, 3]` of linear RGB. It is not in the file.
@@ -71,6 +73,17 @@ class Model:
     style: NDArray[np.uint8] | None = None
     version: str = vnca.__version__
     inputs: Mapping[str, Any] = field(default_factory=dict)
+    more_styles: tuple[NDArray[np.uint8], ...] = ()
+
+    @property
+    def thumbnails(self) -> tuple[NDArray[np.uint8], ...]:
+        """Those of all its style pictures."""
+        return () if self.style is None else (self.style, *self.more_styles)
+
+    @property
+    def style_names(self) -> list[str]:
+        """What its styles are called, in their order; of a single style nothing is told."""
+        return [entry["name"] for entry in self.training.get(STYLES_TOLD, ())]
 
     def save(self, path: str | Path) -> None:
         """Write the model file, whole or not at all.
@@ -78,6 +91,12 @@ class Model:
         Raises:
             OutputError: If it cannot be written.
         """
+        with whole_file(Path(path)) as temporary:
+            # Not by safetensors itself, which has an error of its own for a full disk.
+            temporary.write_bytes(self.encoded())
+
+    def encoded(self) -> bytes:
+        """The model file."""
         decoder = self.rule.decoder
         shape = dataclasses.asdict(self.rule.config)
         listed = list(map(listed_conditioning, shape.pop("conditioning")))
@@ -86,8 +105,8 @@ class Model:
         tensors: dict[str, NDArray[Any]] = {
             name: np.ascontiguousarray(array, dtype=np.float32) for name, array in weights.items()
         }
-        if self.style is not None:
-            tensors[_STYLE] = np.ascontiguousarray(self.style)
+        pictures = map(np.ascontiguousarray, self.thumbnails)
+        tensors |= dict(zip(_STYLES, pictures, strict=False))
         # One entry: safetensors keeps several in no order, and equal models are equal bytes.
         metadata = {
             _METADATA: json.dumps(
@@ -102,9 +121,7 @@ class Model:
                 }
             )
         }
-        with whole_file(Path(path)) as temporary:
-            # Not by safetensors itself, which has an error of its own for a full disk.
-            temporary.write_bytes(save(tensors, metadata=metadata))
+        return save(tensors, metadata=metadata)
 
     @classmethod
     def load(cls, path: str | Path, *, to_describe: bool = False) -> "Model":
@@ -128,7 +145,7 @@ class Model:
         try:
             with safe_open(path, framework="numpy") as file:
                 metadata = file.metadata() or {}
-                expected = {*_WEIGHTS, *_DECODER, _STYLE}
+                expected = {*_WEIGHTS, *_DECODER, *_STYLES}
                 known = [name for name in file.keys() if name in expected]  # noqa: SIM118
                 tensors = {name: file.get_tensor(name) for name in known}
         # Types that numpy lacks raise the last two.
@@ -151,14 +168,26 @@ class Model:
                 decoder=_decoder(tensors),
             )
             training, version = dict(described["training"]), str(described["version"])
+            _check_styles(training, rule)
         except (KeyError, TypeError, ValueError, RecursionError, OptionError) as error:
             raise ModelError(f"{path}: damaged model metadata ({error})") from error
         except ShapeError as error:
             raise ModelError(f"{path}: {error}") from error
-        style = tensors.get(_STYLE)
-        if style is not None and (style.dtype != np.uint8 or style.shape[2:] != (3,)):
+        pictures = [tensors[name] for name in _STYLES if name in tensors]
+        if any(each.dtype != np.uint8 or each.shape[2:] != (3,) for each in pictures):
             raise ModelError(f"{path}: the style thumbnail is not an 8-bit picture")
-        return cls(rule, training, style, version)
+        style, *others = pictures or [None]
+        return cls(rule, training, style, version, more_styles=tuple(others))
+
+
+def _check_styles(training: Mapping[str, Any], rule: Rule) -> None:
+    """Raise `ValueError` unless a model tells of as many styles as its rule mixes, by name."""
+    told, count = training.get(STYLES_TOLD, []), rule.config.style_count
+    if not isinstance(told, list) or not all(isinstance(entry, dict) for entry in told):
+        raise ValueError(f"styles {told!r}")
+    names = {entry.get("name") for entry in told}
+    if len(told) != count or len(names) != count or not all(type(name) is str for name in names):
+        raise ValueError(f"styles {told!r} of a rule of {count}")
 
 
 def _renamed(record: Any) -> Any:
@@ -181,6 +210,8 @@ def _decoder(tensors: dict[str, NDArray[Any]]) -> Decoder | None:
 
 def _oldest_format(rule: Rule) -> int:
     """The oldest format that holds a rule."""
+    if rule.config.style_count:
+        return 5
     if rule.config.transport:
         return 4
     if rule.config.conditioning != CONDITIONING:
@@ -307,75 +338,3 @@ def _check_format(path: Path, version: Any) -> None:
             f"{path}: model format {version} is newer than this vnca reads ({FORMAT_VERSION}); "
             "upgrade vnca"
         )
-
-
-SUFFIX = ".safetensors"
-THUMBNAIL = ".webp"
-"""Of the picture, beside each model, of smoke painted with it."""
-_FOLDER = files("vnca.data").joinpath("styles")
-
-
-def style_names() -> list[str]:
-    """The styles that there are, in alphabetical order."""
-    names = (file.name for file in _FOLDER.iterdir())
-    return sorted(name.removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX))
-
-
-def require_style(name: str) -> None:
-    """Raise `OptionError` unless there is a style of that name."""
-    names = style_names()
-    if name not in names:
-        raise OptionError(f"`style` {name}: expected one of {', '.join(names)}")
-
-
-def load_style(name: str) -> Model:
-    """A style of the library.
-
-    Raises:
-        OptionError: If there is none of that name.
-    """
-    require_style(name)
-    with as_file(_FOLDER.joinpath(name + SUFFIX)) as path:
-        return Model.load(path)
-
-
-def style_bytes(name: str) -> bytes:
-    """The model file of a style."""
-    return _FOLDER.joinpath(name + SUFFIX).read_bytes()
-
-
-def style_thumbnail(name: str) -> bytes:
-    """A picture of smoke painted in a style, the bytes of a WebP file."""
-    return _FOLDER.joinpath(name + THUMBNAIL).read_bytes()
-
-
-def nearest_style(picture: FloatArray) -> str:
-    """The style whose picture has the palette most like that of another.
-
-    By the Fréchet distance between the colours of both as normal distributions.
-
-    Args:
-        picture: sRGB from 0 to 1, `[r, c, 3]`.
-    """
-    ours = _palette(picture)
-    distances = {}
-    for name in style_names():
-        style = load_style(name).style
-        assert style is not None, "a style of the library has its picture"
-        distances[name] = _distance(ours, _palette(style / 255))
-    return min(distances, key=lambda name: distances[name])
-
-
-def _palette(picture: AnyArray) -> tuple[AnyArray, AnyArray]:
-    """Mean and covariance of the colours."""
-    colours = picture.reshape(-1, 3).astype(np.float64)
-    return colours.mean(0), np.cov(colours.T)
-
-
-def _distance(one: tuple[AnyArray, AnyArray], other: tuple[AnyArray, AnyArray]) -> float:
-    """The squared Fréchet distance (Dowson and Landau 1982)."""
-    (mean, covariance), (other_mean, other_covariance) = one, other
-    # The eigenvalues of a product of two such matrices are real and not negative.
-    product = np.linalg.eigvals(covariance @ other_covariance).real.clip(0)
-    spread = np.trace(covariance) + np.trace(other_covariance) - 2 * np.sqrt(product).sum()
-    return float(((mean - other_mean) ** 2).sum() + spread)

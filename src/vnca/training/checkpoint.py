@@ -151,19 +151,20 @@ def _of_part(tensors: Mapping[str, Tensor], part: str) -> dict[str, Tensor]:
 
 
 def fingerprints(
-    style: FloatArray,
+    style: FloatArray | Sequence[FloatArray],
     config: TrainingConfig,
     network: FeatureNetwork,
     **others: Sequence[AnyArray | tuple[int, ...]],
 ) -> dict[str, str]:
     """What tells each input of a training from another, wherever its file lies.
 
-    `others` are the arrays of all other inputs, by what they are.
+    `style` is one picture, or several; `others` are the arrays of all other inputs, by what they
+    are.
     """
     options = {k: v for k, v in dataclasses.asdict(config).items() if k != "features"}
     return {
         **{name: _digest(*arrays) for name, arrays in others.items()},
-        "style picture": _digest(style),
+        "style picture": _digest(*([style] if isinstance(style, np.ndarray) else style)),
         "options": hashlib.sha256(json.dumps(options).encode()).hexdigest(),
         "network that compares": network.origin,
     }

@@ -24,6 +24,7 @@ from vnca.training.config import TrainingConfig
 from vnca.training.descent import MOST_ROLLBACKS, Descent
 from vnca.training.rollout import Pool, roll_out, states_to_keep
 from vnca.training.scenes import Scene
+from vnca.training.styles import WHOLE, Lessons, Mix
 from vnca.training.terms import AppearanceTerm, Iteration, OverflowTerm, SteadinessTerm, Term
 
 
@@ -47,7 +48,7 @@ class Progress:
 
 
 class Trainer:
-    """A rule in training on one scene and one style picture.
+    """A rule in training on one scene and one style picture, or several.
 
     Every random choice comes from `config.seed`: same seed, same machine, same rule.
 
@@ -56,6 +57,8 @@ class Trainer:
         scene: What is trained on.
         session: What computes the automaton; another that does the same may take its place.
         iteration: Iterations done.
+        origins: What tells the weights that it began with, and theirs, from others.
+        appearances: How far pictures are from each style picture.
         terms: Those of the loss, in the order in which they are asked.
         kept_states: How many states of a rollout are kept at a time, at most.
     """
@@ -64,7 +67,7 @@ class Trainer:
         self,
         scene: Scene[Any],
         rule: Rule,
-        style: FloatArray,
+        style: FloatArray | Sequence[FloatArray],
         config: TrainingConfig,
         network: FeatureNetwork,
         *,
@@ -76,7 +79,7 @@ class Trainer:
         Args:
             scene: What is trained on; its device is where is computed.
             rule: The rule to begin with.
-            style: Linear RGB `[r, c, 3]`.
+            style: Linear RGB `[r, c, 3]`; one for each style of a rule that mixes several.
             config: The hyperparameters.
             network: The frozen network that judges pictures.
             terms: Further terms of the loss, beside appearance and overflow.
@@ -88,6 +91,7 @@ class Trainer:
         """
         self.config, self.scene = config, scene
         self.iteration = 0
+        self.origins: tuple[str, ...] = ()
         device = scene.priors.device
         self._rule = rule
         self._weights = Weights(
@@ -111,13 +115,17 @@ class Trainer:
             Compute(config.backend, str(device)),
             differentiable=True,
         )
-        self._appearance = AppearanceLoss(
-            network, style, config.appearance, config.pictures.size, scene.width
+        self.appearances = tuple(
+            AppearanceLoss(network, picture, config.appearance, config.pictures.size, scene.width)
+            for picture in ([style] if isinstance(style, np.ndarray) else style)
         )
+        self._columns, self._lessons = rule.config.style_columns, None
+        if self._columns is not None:
+            self._lessons = Lessons(len(self.appearances), scene.domain, config.seed)
         self._random = np.random.default_rng(config.seed)
         self._generator = torch.Generator().manual_seed(config.seed)
         own: list[Term] = [
-            AppearanceTerm(self._appearance, self._generator),
+            AppearanceTerm(self.appearances, self._generator),
             OverflowTerm(config.overflow),
         ]
         if config.steadiness:
@@ -129,8 +137,14 @@ class Trainer:
         self._before: dict[str, Snapshot] | None = None  # the iteration that is under way
         self.kept_states = states_to_keep(scene, config, memory_budget)
 
-    def begin_with(self, rule: Rule) -> None:
-        """Take over the weights of a rule of the same shape, before the first iteration."""
+    def begin_with(self, rule: Rule, origins: Sequence[str] = ()) -> None:
+        """Take over the weights of a rule of the same shape, before the first iteration.
+
+        Args:
+            rule: The rule.
+            origins: What it goes back to, as `vnca.rule.mixing.origins` tells.
+        """
+        self.origins = tuple(origins)
         decoder = rule.decoder.weights if rule.decoder is not None else ()
         arrays = (rule.hidden, rule.bias, rule.output, *decoder)
         with torch.no_grad():
@@ -154,18 +168,13 @@ class Trainer:
 
     @property
     def background(self) -> Tensor:
-        """Linear RGB `[3]` that pictures are composited over: the style's mean colour."""
-        return self._appearance.background
+        """Linear RGB `[3]` that pictures are composited over: the (first) style's mean colour."""
+        return self.appearances[0].background
 
     @property
-    def style_scale(self) -> float:
-        """Shorter side of the style picture relative to the pictures compared with it."""
-        return self._appearance.style_scale
-
-    @property
-    def picture_cells(self) -> float:
-        """Cells along the shorter side of the style picture, as the rule is shown it."""
-        return self.style_scale * self.scene.width
+    def picture_cells(self) -> list[float]:
+        """Cells along the shorter side of each style picture, as the rule is shown it."""
+        return [one.style_scale * self.scene.width for one in self.appearances]
 
     @property
     def learning_rate(self) -> float:
@@ -219,6 +228,7 @@ class Trainer:
             "iteration": self.iteration,
             "steps": self._steps,
             "random": self._random.bit_generator.state,
+            "origins": list(self.origins),
         }
         own = Snapshot({"generator": self._generator.get_state()}, values)
         parts = {name: part.snapshot() for name, part in self._parts().items()}
@@ -234,6 +244,7 @@ class Trainer:
         self.iteration = count(own.values["iteration"], "iteration", most=self.config.iterations)
         self._steps = count(own.values["steps"], "steps")
         self._random.bit_generator.state = own.values["random"]
+        self.origins = tuple(map(str, own.values["origins"]))
         self._generator.set_state(own.tensors["generator"])
         for name, part in self._parts().items():
             if part.snapshot() is not None:
@@ -252,10 +263,17 @@ class Trainer:
         scene = self.scene.augmented(life)
         if config.rule.transport and age:
             before = scene.transported(before, self._random)
+        judged = WHOLE
+        mix = self._lessons and self._lessons.of(life, age)
+        if mix is not None and self._columns is not None:
+            scene, age = mix.asked(scene, self._columns), mix.age
         state = self._roll(before, range(self._steps, self._steps + steps), scene)
         self._steps += steps
         viewpoint = scene.viewpoint(self._random)
-        pictures, opacity = scene.pictures(state, viewpoint, self.background)
+        if mix is not None:
+            judged = mix.judged(scene, viewpoint, self._random)
+        background = self.appearances[judged.style].background
+        pictures, opacity = scene.pictures(state, viewpoint, background)
         sums: dict[str, Tensor] = {}
         seen = Iteration(
             before=before,
@@ -266,7 +284,8 @@ class Trainer:
             viewpoint=viewpoint,
             pictures=pictures,
             opacity=opacity,
-            background=self.background,
+            background=background,
+            judged=judged,
             sums=sums,
         )
         terms: dict[str, Tensor] = {}
@@ -288,11 +307,13 @@ class Trainer:
             diverged=not went_on,
         )
 
-    def grow(self, steps: int) -> Tensor:
+    def grow(self, steps: int, style: int = 0) -> Tensor:
         """A state grown from the seed, as painting does; no random stream moves."""
+        scene = self.scene
+        if self._columns is not None:
+            scene = Mix(style, style, 0.0, 0).asked(scene, self._columns)
         with torch.no_grad():
-            seed = self.scene.seed(self.config.rule.channels)
-            return self._roll(seed, range(steps), self.scene)
+            return self._roll(scene.seed(self.config.rule.channels), range(steps), scene)
 
     def _roll(self, state: Tensor, steps: range, scene: Scene[Any]) -> Tensor:
         """The state after the numbered steps of the rule; differentiable in the weights."""

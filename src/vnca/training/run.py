@@ -112,15 +112,17 @@ PREVIEW_SIZE = 256
 """Rows and columns of each picture, pixels."""
 
 
-def preview_sheet(trainer: Trainer, style: FloatArray) -> FloatArray:
-    """The style beside what a state grown from the seed looks like, linear RGB `[r, c, 3]`.
+def preview_sheet(trainer: Trainer, *styles: FloatArray) -> FloatArray:
+    """Each style beside what a state grown from the seed looks like, linear RGB `[r, c, 3]`.
 
     Leaves the trainer's random streams as they were, so that looking changes nothing.
     """
-    state = trainer.grow(2 * trainer.config.longest_rollout)
-    with torch.no_grad():
-        preview_views = trainer.scene.preview_views(state, PREVIEW_SIZE)
-    return contact_sheet([[_square(style), *preview_views]])
+    rows = []
+    for number, style in enumerate(styles):
+        state = trainer.grow(2 * trainer.config.longest_rollout, number)
+        with torch.no_grad():
+            rows.append([_square(style), *trainer.scene.preview_views(state, PREVIEW_SIZE)])
+    return contact_sheet(rows)
 
 
 def _square(style: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ import math
 import statistics
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +33,7 @@ from vnca.rule import DENSITY_CHANGE
 from vnca.training import Snapshot
 from vnca.training.scenes import Scene
 from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
+from vnca.training.styles import WHOLE, Judged
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,7 @@ class Iteration:
     Attributes:
         before: The state at the start of the rollout, `[n + 1, C]`.
         after: The state at its end, alike; differentiable.
-        age: Rollouts that the state had been through before.
+        age: Rollouts that the state had been through before, in what styles are asked for now.
         frames: Frames that pass in the rollout: its steps over those of a frame.
         scene: That the rollout was in, as it is augmented.
         viewpoint: Where the pictures were taken from.
@@ -51,6 +52,7 @@ class Iteration:
         opacity: `[b, r, c]`.
         background: Linear RGB `[3]`.
         sums: What the terms before this one came to, weighted, by their names.
+        judged: By which style picture, and where; by the first, everywhere, unless told.
     """
 
     before: Tensor
@@ -63,6 +65,7 @@ class Iteration:
     opacity: Tensor
     background: Tensor
     sums: Mapping[str, Tensor]
+    judged: Judged = WHOLE
 
 
 class Term(ABC):
@@ -99,16 +102,20 @@ class AppearanceTerm(Term):
 
     name = "appearance"
 
-    def __init__(self, loss: AppearanceLoss, generator: torch.Generator) -> None:
-        """Judge by a loss; the generator draws its positions."""
-        self._loss, self._generator = loss, generator
+    def __init__(self, losses: Sequence[AppearanceLoss], generator: torch.Generator) -> None:
+        """Judge by the loss of a style; the generator draws its positions."""
+        self._losses, self._generator = losses, generator
 
     def __call__(self, seen: Iteration) -> dict[str, Tensor]:
         """Style, moments and palette."""
+        style, where = seen.judged
+        loss, opacity = self._losses[style], seen.opacity
+        if where is not None:
+            opacity = opacity * where
         grey = None
-        if self._loss.config.shows_density:
+        if loss.config.shows_density:
             grey = seen.scene.density_pictures(seen.after, seen.viewpoint, seen.background)
-        return self._loss(seen.pictures, seen.opacity, self._generator, grey).terms
+        return loss(seen.pictures, opacity, self._generator, grey).terms
 
 
 class OverflowTerm(Term):

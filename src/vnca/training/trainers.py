@@ -22,12 +22,13 @@ from vnca.training.config import SmokeConfig, TextureConfig, ViewConfig
 from vnca.training.loop import Trainer
 from vnca.training.scenes.smoke import SmokeScene, velocity_scale
 from vnca.training.scenes.texture import BlockScene
+from vnca.training.styles import told_styles
 from vnca.training.terms import MassTerm, MotionSupervision, Term
 
 
 def smoke_trainer(
     smoke: Volume,
-    style: FloatArray,
+    style: FloatArray | Sequence[FloatArray],
     config: SmokeConfig,
     network: FeatureNetwork,
     *,
@@ -39,7 +40,7 @@ def smoke_trainer(
 
     Args:
         smoke: The frame, which is laid on a lattice of its own.
-        style: Linear RGB `[r, c, 3]`.
+        style: Linear RGB `[r, c, 3]`; or several, which the rule learns all.
         config: The hyperparameters.
         network: The frozen network that judges pictures.
         device: Where to compute.
@@ -52,6 +53,7 @@ def smoke_trainer(
     """
     what = f"frame {smoke.frame}"
     smoke = on_lattice(smoke, Lattice.of(smoke.index_to_world, what), what)
+    config = told_styles(config, style)
     rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
     rule = replace(rule, decoder=config.initial_decoder())
     scene = SmokeScene(
@@ -83,7 +85,7 @@ def _gamma(density: AnyArray, view: ViewConfig) -> float:
 
 
 def texture_trainer(
-    style: FloatArray,
+    style: FloatArray | Sequence[FloatArray],
     config: TextureConfig,
     network: FeatureNetwork,
     *,
@@ -94,7 +96,7 @@ def texture_trainer(
     """What trains a rule to grow blocks that look like a picture wherever they are cut.
 
     Args:
-        style: Linear RGB `[r, c, 3]`.
+        style: Linear RGB `[r, c, 3]`; or several, which the rule learns all.
         config: The hyperparameters.
         network: The frozen network that judges pictures.
         mesh: Looked at beside the slices.
@@ -104,6 +106,7 @@ def texture_trainer(
     Raises:
         OptionError: If the memory budget is not enough.
     """
+    config = told_styles(config, style)
     rule = initial_rule(config)
     scene = BlockScene(
         config.block,

@@ -15,7 +15,7 @@ import pytest
 from vnca.cli import main
 from vnca.core import Box
 from vnca.io.vdb import Grid, Transform, open_vdb, write_vdb
-from vnca.rule.model import style_names
+from vnca.rule.library import style_names
 
 ROOT = Path(__file__).parents[3] / "integrations" / "blender"
 CACHES = ROOT / "tests" / "data"

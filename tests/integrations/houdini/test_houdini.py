@@ -18,7 +18,7 @@ from vnca.cli import main
 from vnca.core.volume import Volume
 from vnca.io import write_smoke
 from vnca.io.vdb import open_vdb, write_vdb
-from vnca.rule.model import style_names
+from vnca.rule.library import style_names
 
 ROOT = Path(__file__).parents[3] / "integrations" / "houdini"
 NAMES = ("request", "work", "node", "farm", "asset")

@@ -1,5 +1,6 @@
 """What a rule is trained on: cells, and how the colours they take are looked at."""
 
+import copy
 from abc import ABC, abstractmethod
 from typing import Generic, TypeVar
 
@@ -103,6 +104,29 @@ class Scene(ABC, Generic[Viewpoint]):
         """A scene of the same cells that a state of the pool leads its life in, by a number."""
         del number
         return self
+
+    def in_shares(self, shares: Tensor, columns: slice) -> "Scene[Viewpoint]":
+        """A scene of the same cells in which a rule of several styles mixes them.
+
+        Args:
+            shares: Of each style, `[K]` or `[n, K]`.
+            columns: Where in the priors they stand.
+        """
+        scene = copy.copy(self)
+        scene.priors = self.priors.clone()
+        scene.priors[:, columns] = shares
+        return scene
+
+    @abstractmethod
+    def seen_shares(self, shares: Tensor, viewpoint: Viewpoint) -> Tensor:
+        """Of what is seen in each pixel of `pictures`, `[b, r, c]`, the part that a field has.
+
+        Not a number where nothing is seen.
+
+        Args:
+            shares: The field, `[n]`, from 0 to 1.
+            viewpoint: Where to look from.
+        """
 
     def transported(self, state: Tensor, random: np.random.Generator) -> Tensor:
         """A state carried along for a random part of a frame; no gradient flows through it.

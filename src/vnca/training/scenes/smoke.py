@@ -17,6 +17,7 @@ from vnca.core.errors import GridError
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
 from vnca.losses import luma
+from vnca.losses.appearance import AppearanceLoss
 from vnca.rendering import Shader, View, projected_velocity, render
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
 from vnca.rule import SMOKE_THRESHOLD, Rule, gamma_for_own_colour
@@ -212,6 +213,23 @@ class SmokeScene(Scene[SmokeViewpoint]):
         view = self.look(state, viewpoint.camera, offset=viewpoint.offset)
         picture = linear_to_srgb(view.over(background))
         return picture.permute(2, 0, 1)[None], view.opacity[None]
+
+    @torch.no_grad()
+    def seen_shares(self, shares: Tensor, viewpoint: SmokeViewpoint) -> Tensor:
+        """See `Scene.seen_shares`; of the smoke with the density of its file."""
+        view = render(
+            self.dense(self._density),
+            self.dense(shares[:, None].expand(-1, 3)),
+            viewpoint.camera,
+            rows=self.view.size,
+            columns=self.view.size,
+            gamma=self.gamma,
+            step=self.view.step,
+            offset=viewpoint.offset,
+            cells_to_world=self._place,
+        )
+        share = (view.colour[..., 0] / view.opacity).clamp(0, 1)
+        return torch.where(view.opacity > AppearanceLoss.least_opacity, share, torch.nan)[None]
 
     def density_pictures(
         self, state: Tensor, viewpoint: SmokeViewpoint, background: Tensor

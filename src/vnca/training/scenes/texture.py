@@ -91,11 +91,11 @@ def periodic(block: Float[Tensor, "x y z c"]) -> Float[Tensor, "_ _ _ c"]:
 
 
 def shown(
-    block: Float[Tensor, "x y z 3"], points: Float[Tensor, "*pixels 3"]
-) -> Float[Tensor, "*pixels 3"]:
-    """Colours of a block that tiles space at points in cells, trilinear; differentiable."""
-    size = points.new_tensor(block.shape[:3])
-    return sample(periodic(block), torch.remainder(points, size).view(-1, 3)).view(points.shape)
+    block: Float[Tensor, "x y z c"], points: Float[Tensor, "*pixels 3"]
+) -> Float[Tensor, "*pixels c"]:
+    """Values of a block that tiles space at points in cells, trilinear; differentiable."""
+    inside = torch.remainder(points, points.new_tensor(block.shape[:3])).view(-1, 3)
+    return sample(periodic(block), inside).view(*points.shape[:-1], -1)
 
 
 def averaged(samples: Float[Tensor, "_ _ c"], along: int) -> Float[Tensor, "_ _ c"]:
@@ -220,6 +220,19 @@ class BlockScene(Scene[list[Cut]]):
             pictures.append(as_picture(averaged(colour, samples)))
             opacities.append(opacity)
         return torch.cat(pictures), torch.stack(opacities)
+
+    @torch.no_grad()
+    def seen_shares(self, shares: Tensor, viewpoint: list[Cut]) -> Tensor:
+        """See `Scene.seen_shares`."""
+        size, samples = self.slices.size, self.slices.supersampling
+        field, pictures = self.dense(shares[:, None]), []
+        for points, covered in viewpoint:
+            part = shown(field, points)
+            if covered is not None:
+                empty = field.new_full((*covered.shape, 1), torch.nan)
+                part = empty.index_put((covered,), part)
+            pictures.append(averaged(part, samples).view(size, size))
+        return torch.stack(pictures)
 
     def preview_views(self, state: Tensor, size: int) -> list[FloatArray]:
         """Slices from the front, the right and above, and across a diagonal."""
