@@ -34,7 +34,7 @@ _PEERS = ("iterations", "gamma", "enlarged", "whole-picture", "seed")
 COMMON: Mapping[str, tuple[str, ...]] = {
     "paint": (
         *("out", "style", "preset", "frames", "refine", "strength", "masks"),
-        *("layers", "style-mix", "seed", *_SMOKE, "device", "resume", "overwrite"),
+        *("layers", "seed", *_SMOKE, "device", "resume", "overwrite"),
     ),
     "train": (
         *("out", "preset", "iterations", "view.size", "seed", "texture", "graft", *_SMOKE),
@@ -42,7 +42,7 @@ COMMON: Mapping[str, tuple[str, ...]] = {
     ),
     "stylize": (
         *("out", "frames", "refine", "preview", "strength", "density-strength", "gamma", "seed"),
-        *("masks", "layers", "style-mix", "device", "resume", "overwrite", "on-error", *_SMOKE),
+        *("masks", "layers", "device", "resume", "overwrite", "on-error", *_SMOKE),
     ),
     "evaluate": ("out", "frames", "refine", "style", "size", "device", "json"),
     "ablate": ("out", "preset", "seeds", "iterations", "json", "device", *_SMOKE),

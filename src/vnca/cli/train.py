@@ -35,12 +35,11 @@ class Train(smoke.SmokeRun):
     frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
-    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
+    """The picture (docs/guide/formats.md lists the formats)."""
     more_styles: Annotated[
         tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[STYLE …]")
     ] = ()
-    """Further pictures, up to eight in all: the rule learns them all and mixes them as it is told
-    when it paints (`--style-mix`). For K pictures there are √K times as many iterations."""
+    """Further pictures, up to eight in all."""
     preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = DEFAULT
     """Values of all hyperparameters that are not given: draft, standard, paper, or a TOML file."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
@@ -80,12 +79,11 @@ class TrainTexture(texture.TextureRun):
     out: Path
     """Folder of the run: model, configuration, previews and loss curves."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
-    """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
+    """The picture (docs/guide/formats.md lists the formats)."""
     more_styles: Annotated[
         tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[STYLE …]")
     ] = ()
-    """Further pictures, up to eight in all: the rule learns them all and mixes them as it is told
-    when it paints (`--style-mix`). For K pictures there are √K times as many iterations."""
+    """Further pictures, up to eight in all."""
     preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = DEFAULT
     """Values of all hyperparameters that are not given: draft, standard, or a TOML file."""
     config: TextureConfig = field(default_factory=TextureConfig)
