@@ -21,7 +21,7 @@ LAST, SIDE = 24, 176
 SMOKE = ("--resolution", 36, "--frames", LAST)
 PAINTED = ("--frames", f"{LAST - 3}-{LAST}", "--refine", 2, "--without-film")
 SEEN = ("--rows", SIDE, "--columns", SIDE, "--frames", LAST, "--light", 0.9)
-GLASS, FROST = "stained_glass", "frost"
+GLASS, FROST, FIELD, CUT = "stained_glass", "frost", "harvest", "woodcut"
 CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "strength": (GLASS, ("--strength", 0.4)),
     "mask": (GLASS, ("--strength", "sphere(0.5,0.2,0.35, 0.2, soft=0.15)")),
@@ -32,6 +32,10 @@ CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "advected": (GLASS, ("--strength", "advected(smooth x:0.4..0.6)")),
     "density_strength": (GLASS, ("--density-strength", 0)),
     "steps_per_frame": (GLASS, ("--steps-per-frame", 2)),
+    "guide": (FIELD, ("--guide", "z")),
+    "guide_cross": (FIELD, ("--guide", "cross(gradient, 1,0,1)")),
+    "pattern_size": (CUT, ("--pattern-size", 2)),
+    "pattern_size_ramp": (CUT, ("--pattern-size", "smooth height:0.1..0.5->2..0.8")),
     "layers": (GLASS, ("--layers", "frost=smooth x:0.4..0.6")),
     "hue": (GLASS, ("--hue", 140)),
     "saturation": (GLASS, ("--saturation", 0.3)),

@@ -13,7 +13,7 @@ from vnca.core.field import Field
 from vnca.core.volume import Volume
 from vnca.direction import Direction, Inputs, Moment
 from vnca.direction.grammar import parsed_guide
-from vnca.direction.guides import STROKES, steering
+from vnca.direction.guides import inwards, steering
 from vnca.engine.automaton import Automaton, Weights, stencil
 
 CELLS = np.stack(np.meshgrid(*[np.arange(4, 8)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -122,29 +122,35 @@ def test_what_is_no_guide_is_told_with_its_character(text: str, at: int, why: st
     assert error.value.at == at
 
 
-def test_steering_is_the_least_rotation_to_the_strokes_of_the_rule() -> None:
+def test_steering_turns_the_frame_of_the_picture_to_direction_and_surface() -> None:
     random = np.random.default_rng(0)
-    directions = random.standard_normal((50, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    special = np.array([[0, 0, 1], [0, 0, -1], [0, 0, 0], [1e-9, 0, -1]])
-    directions = np.concatenate([directions, special])
-    found = steering(directions, 1.0, len(directions)).astype(np.float64)
-    np.testing.assert_allclose(
-        found @ found.transpose(0, 2, 1), np.broadcast_to(np.eye(3), found.shape), atol=1e-5
-    )
+    along, inward = random.standard_normal((2, 50, 3))
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    special = np.array([[1, 0, 0], [-1, 0, 0], [0, 0, 0], [-1, 1e-9, 0], [0, 0, 1]])
+    along = np.concatenate([along, special])
+    inward = np.concatenate([inward, np.zeros((4, 3)), special[-1:]])
+    found = steering(along, inward, 1.0, len(along)).astype(np.float64)
+    eyes = np.broadcast_to(np.eye(3), found.shape)
+    np.testing.assert_allclose(found @ found.transpose(0, 2, 1), eyes, atol=1e-5)
     np.testing.assert_allclose(np.linalg.det(found), 1, atol=1e-5)
-    turned = np.einsum("nij,nj->ni", found, directions)
-    some = directions.any(axis=1)
+    to_right = np.einsum("nij,nj->ni", found, along)[along.any(axis=1)]
+    np.testing.assert_allclose(to_right, np.broadcast_to([1, 0, 0], to_right.shape), atol=1e-5)
+    np.testing.assert_allclose(found[[50, 52]], eyes[:2], atol=1e-6)
+    # What lies inwards is met straight on, as far as the direction lets it.
+    turned = np.einsum("nij,nj->ni", found[:50], inward[:50])
+    assert (turned[:, 1] > 0).mean() > 0.9
+    assert np.abs(turned[:, 2]).max() < 0.1
+    np.testing.assert_allclose(steering(along, inward, 2.0, len(along)), 2 * found, atol=1e-4)
+    halves = np.linspace(0.5, 1, len(along))
     np.testing.assert_allclose(
-        turned[some], np.broadcast_to(STROKES, turned[some].shape), atol=1e-4
+        steering(None, None, halves, len(along)), halves[:, None, None] * eyes, atol=1e-6
     )
-    np.testing.assert_array_equal(found[[50, 52]], np.broadcast_to(np.eye(3), (2, 3, 3)))
-    # The least: the axis of the rotation is across both.
-    angle = np.arccos(np.clip(directions[:50] @ np.array(STROKES), -1, 1))
-    np.testing.assert_allclose(
-        np.trace(found[:50], axis1=1, axis2=2), 1 + 2 * np.cos(angle), atol=1e-5
-    )
-    np.testing.assert_allclose(steering(directions, 2.0, len(directions)), 2 * found, atol=1e-4)
+
+
+def test_inwards_is_where_density_grows() -> None:
+    found = inwards(moment(), np.array([[0, 6, 6], [6, 11, 6], [6, 6, 1]], np.int32))
+    np.testing.assert_allclose(found, [[1, 0, 0], [0, -1, 0], [0, 0, 1]], atol=1e-6)
 
 
 def test_strokes_run_along_the_nearest_curve(tmp_path: Path) -> None:
@@ -187,15 +193,13 @@ def assert_same(ones: list[Any], others: list[Any]) -> None:
             np.testing.assert_array_equal(one[name], other[name])
 
 
-@pytest.mark.parametrize(
-    "options",
-    [{"guide": "z"}, {"guide": "1:z 3:0,0,2"}, {"pattern_size": "frame:0..1->0.5..1"}],
-    ids=str,
-)  # fmt: skip
-def test_a_guide_along_the_strokes_and_size_1_change_nothing(
-    painted: Painted, options: dict[str, Any]
+def test_size_1_and_a_guide_of_no_direction_change_nothing(
+    painted: Painted, add_vectors: Callable[..., None]
 ) -> None:
-    assert_same(painted(), painted(**options))
+    plain = painted()
+    assert_same(plain, painted(pattern_size="frame:0..1->0.5..1"))
+    add_vectors("still", (0, 0, 0))
+    assert_same(plain, painted(guide="@still"))
 
 
 @pytest.mark.parametrize(
@@ -210,7 +214,7 @@ def test_a_guide_and_a_size_change_the_pattern(painted: Painted, options: dict[s
 
 def test_a_grid_of_vectors_guides(painted: Painted, add_vectors: Callable[..., None]) -> None:
     add_vectors("along", (0, 0, 3))
-    assert_same(painted(), painted(guide="@along"))
+    assert_same(painted(guide="1:z"), painted(guide="@along"))
     add_vectors("across", (3, 0, 0))
     assert_same(painted(guide="x"), painted(guide="@across"))
 
@@ -226,7 +230,7 @@ def test_a_guide_that_frames_lack_is_told_before_the_first(
     add_vectors("along", (0, 0, 1), frames=(1, 3))
     with pytest.raises(GridError, match="no grid 'along'"):
         painted(guide="@along")
-    assert_same(painted(), painted(guide="@along", missing="hold"))
+    assert_same(painted(guide="z"), painted(guide="@along", missing="hold"))
     with pytest.raises(VncaError, match="no such file"):
         painted(guide='curve("nowhere.txt")')
 

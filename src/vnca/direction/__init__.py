@@ -21,7 +21,7 @@ from vnca.direction.colour import Editing, require_exchange
 from vnca.direction.colour.fire import emission
 from vnca.direction.colour.grading import graded
 from vnca.direction.grammar import parsed, parsed_guide
-from vnca.direction.guides import steering, unit
+from vnca.direction.guides import inwards, steering, unit
 from vnca.direction.mixing import Answer, mixed, per_colour
 from vnca.direction.moment import Inputs, Missing, Moment
 from vnca.direction.silhouette import Silhouette, fluffed, outlined
@@ -142,10 +142,11 @@ class Direction:
         """
         if not self.steers:
             return None
-        directions = (
-            None if self.guided is None else unit(np.asarray(self.guided.at(moment, cells)))
-        )
-        return steering(directions, self.value("pattern_size", moment, cells), len(cells))
+        size = self.value("pattern_size", moment, cells)
+        if self.guided is None:
+            return steering(None, None, size, len(cells))
+        directions = unit(np.asarray(self.guided.at(moment, cells)))
+        return steering(directions, inwards(moment, cells), size, len(cells))
 
     @property
     def substeps(self) -> int:

@@ -18,43 +18,46 @@ from vnca.direction.values import Value
 
 REACH = 2
 """Cells of the smoke over which it is told how it changes: strokes cannot follow what is finer."""
-STROKES = (0.0, 0.0, 1.0)
-"""Along which axis a rule draws its strokes where it is not guided."""
-_NONE, _OPPOSITE = 1e-12, 1e-6
+_NONE = 1e-12
+_BESIDE = 0.05
+"""Where the surface says less about the frame, the least rotation does."""
+_STEEP = 0.1
+"""Of the steepest change of density, what counts as a surface."""
 
 
-def steering(directions: AnyArray | None, size: Answer, count: int) -> FloatArray:
+def steering(
+    directions: AnyArray | None, inwards: AnyArray | None, size: Answer, count: int
+) -> FloatArray:
     """What cells are steered by, `[n, 3, 3]`, so that strokes run along directions.
 
-    By the least rotation that takes the direction to `STROKES`, times the size. It is continuous
-    but where a direction is opposite to that; there it is a half turn about x.
+    A rule has a frame as its picture has: x to the right, y into the smoke, z up. It is turned so
+    that x lies along the direction and y as nearly inwards as that leaves it: a surface that the
+    direction runs along shows the picture turned, and nothing else. Where a direction goes straight
+    inwards, the rest is as the least rotation has it.
 
     Args:
         directions: `[n, 3]`, one long; where zero, nothing is turned. None turns none.
+        inwards: `[n, 3]` into the smoke, at most one long.
         size: How many times as large the pattern is to be.
         count: Of cells.
     """
     turned = np.broadcast_to(np.eye(3), (count, 3, 3))
-    if directions is not None:
-        turned = _least_rotations(directions.astype(np.float64), np.array(STROKES))
+    if directions is not None and inwards is not None:
+        turned = _frames(directions.astype(np.float64), inwards.astype(np.float64))
     each = np.broadcast_to(np.float64(size), count)[:, None, None]
     return np.ascontiguousarray(each * turned, np.float32)
 
 
-def _least_rotations(directions: AnyArray, to: AnyArray) -> AnyArray:
-    """Rotations `[n, 3, 3]` that take directions `[n, 3]` to another the shortest way.
-
-    Reference: Möller and Hughes 1999, "Efficiently building a matrix to rotate one vector to
-    another"; Rodrigues' formula.
-    """
-    sine, cosine = np.cross(directions, to), directions @ to
-    cosine = np.where(directions.any(axis=1), cosine, 1)
-    x, y, z = sine.T
-    none = np.zeros_like(x)
-    across = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
-    part = 1 / np.maximum(1 + cosine, _OPPOSITE)
-    found = np.eye(3) + across + part[:, None, None] * (across @ across)
-    found[1 + cosine <= _OPPOSITE] = np.diag([1.0, -1.0, -1.0])
+def _frames(along: AnyArray, inwards: AnyArray) -> AnyArray:
+    """Rotations `[n, 3, 3]` that take `along` to x and as much as they can of `inwards` to y."""
+    # What the least rotation of x to `along` makes of y; of x turned round, y stays.
+    x, y, _ = along.T
+    first, other = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
+    least = other - (y / np.maximum(1 + x, _NONE))[:, None] * (along + first)
+    second = inwards - (inwards * along).sum(1, keepdims=True) * along + _BESIDE * least
+    second /= np.maximum(np.linalg.norm(second, axis=1, keepdims=True), _NONE)
+    found = np.stack([along, second, np.cross(along, second)], axis=1)
+    found[~along.any(axis=1)] = np.eye(3)
     return found
 
 
@@ -115,6 +118,14 @@ def _gradient(moment: Moment, places: AnyArray) -> AnyArray:
     density = moment.smoke.density_field
     slopes = (_slope(density, places, axis, moment.fineness) for axis in range(3))
     return np.stack([*slopes], axis=1)
+
+
+def inwards(moment: Moment, places: AnyArray) -> FloatArray:
+    """Directions `[n, 3]` into the smoke, one long at its surface and shorter in it."""
+    slopes = _gradient(moment, places)
+    lengths = np.linalg.norm(slopes, axis=1, keepdims=True)
+    steep = max(_STEEP * float(lengths.max(initial=0)), _NONE)
+    return (slopes / np.maximum(lengths, steep)).astype(np.float32)
 
 
 def _velocity_of(moment: Moment) -> Field:
