@@ -7,8 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+import vnca
 from vnca.core import AnyArray, Box
-from vnca.core.errors import FileFormatError, GridError, OptionError, TextError, VncaError
+from vnca.core.errors import (
+    BackendUnavailableError,
+    FileFormatError,
+    GridError,
+    OptionError,
+    TextError,
+    VncaError,
+)
 from vnca.core.field import Field
 from vnca.core.volume import Volume
 from vnca.direction import Direction, Inputs, Moment
@@ -16,6 +24,7 @@ from vnca.direction.grammar import parsed_guide
 from vnca.direction.guides import inwards, steering
 from vnca.engine.automaton import Automaton, Weights, stencil
 
+MODEL = Path(__file__).parents[1] / "data" / "painting" / "rule.safetensors"
 CELLS = np.stack(np.meshgrid(*[np.arange(4, 8)] * 3, indexing="ij"), -1).reshape(-1, 3)
 AT = np.stack(np.meshgrid(*[np.arange(12)] * 3, indexing="ij"), -1) - 5.5
 """Where cells of the smoke lie from its middle."""
@@ -233,6 +242,15 @@ def test_a_guide_that_frames_lack_is_told_before_the_first(
     assert_same(painted(guide="z"), painted(guide="@along", missing="hold"))
     with pytest.raises(VncaError, match="no such file"):
         painted(guide='curve("nowhere.txt")')
+
+
+def test_a_backend_that_cannot_steer_says_so_at_once(painted: Painted, smoke: Path) -> None:
+    for options in ({"guide": "x"}, {"pattern_size": 2}):
+        with pytest.raises(BackendUnavailableError, match="wgsl cannot run: it cannot steer"):
+            painted(backend="wgsl", **options)
+        in_memory = vnca.stylize(MODEL, smoke, backend="wgsl", **options)
+        with pytest.raises(BackendUnavailableError, match="wgsl cannot run: it cannot steer"):
+            next(in_memory)
 
 
 @pytest.mark.parametrize("size", [0.4, 2.1, "0.2 * height", "1:0.5 3:3"])

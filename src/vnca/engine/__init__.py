@@ -327,7 +327,7 @@ def open_session(
     compute: Compute | None = None,
     *,
     differentiable: bool = False,
-    steering: Any = None,
+    steered: bool = False,
 ) -> Session:
     """An automaton on a domain, ready to run.
 
@@ -337,15 +337,14 @@ def open_session(
         conditioning: `[n, P]` of the cells, an array or, for a differentiable session, a tensor.
         compute: How to compute; the fastest way on the CPU unless given.
         differentiable: Whether states are tensors through which gradients flow.
-        steering: `[n, 3, 3]` of the cells, see `Session.steered`; nothing is turned without.
+        steered: Whether cells are to be steered: see `Session.steered`.
 
     Raises:
         BackendUnavailableError: If what was asked for cannot run here.
     """
     compute = compute or Compute()
-    backend = choose(compute, differentiable=differentiable, steered=steering is not None)
-    session = backend.session(Job(automaton, domain, conditioning, compute, differentiable))
-    return session if steering is None else session.steered(steering)
+    backend = choose(compute, differentiable=differentiable, steered=steered)
+    return backend.session(Job(automaton, domain, conditioning, compute, differentiable))
 
 
 def torch_decode(

@@ -193,7 +193,8 @@ class Roll:
             return Ready(smoke, domain, None, layers)
         conditioning = priors(domain, smoke, self.rule)
         automaton = self.rule.automaton(self.config.seed).slowed(self.config.substeps)
-        session = open_session(automaton, domain, conditioning, self.compute)
+        what = (automaton, domain, conditioning, self.compute)
+        session = open_session(*what, steered=self.config.steers)
         return Ready(smoke, domain, session, layers)
 
     def paint(self, smoke: Volume | Ready, state: RollState) -> Painting:
