@@ -21,7 +21,7 @@ LAST, SIDE = 24, 176
 SMOKE = ("--resolution", 36, "--frames", LAST)
 PAINTED = ("--frames", f"{LAST - 3}-{LAST}", "--refine", 2, "--without-film")
 SEEN = ("--rows", SIDE, "--columns", SIDE, "--frames", LAST, "--light", 0.9)
-GLASS, FROST, TWO = "stained_glass", "frost", "two_styles"
+GLASS, FROST, FIELD, CUT, TWO = "stained_glass", "frost", "harvest", "woodcut", "two_styles"
 DATA = HERE.parents[1] / "src" / "vnca" / "data"
 LEARNT = DATA / "vangogh_cafe_terrace.webp", DATA / "rust.webp"
 """The pictures of a rule of two styles."""
@@ -37,6 +37,8 @@ CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "steps_per_frame": (GLASS, ("--steps-per-frame", 2)),
     "style_mix": (TWO, ("--style-mix", "rust=smooth x:0.4..0.6")),
     "style_half": (TWO, ("--style-mix", "rust=0.5")),
+    "guide": (FIELD, ("--guide", "z")),
+    "pattern_size": (CUT, ("--pattern-size", 2)),
     "layers": (GLASS, ("--layers", "frost=smooth x:0.4..0.6")),
     "hue": (GLASS, ("--hue", 140)),
     "saturation": (GLASS, ("--saturation", 0.3)),

@@ -62,6 +62,24 @@ def add_grid(smoke: Path) -> Callable[..., None]:
 
 
 @pytest.fixture
+def add_vectors(smoke: Path) -> Callable[..., None]:
+    """Adds a grid that holds one vector everywhere to frames."""
+
+    def add(name: str, vector: tuple[float, ...], frames: tuple[int, ...] = (1, 2, 3)) -> None:
+        values = np.broadcast_to(np.float32(vector), (24, 24, 24, 3)).copy()
+        transform = Transform.from_matrix(np.diag([0.5, 0.5, 0.5, 1.0]))
+        held = np.ones((24, 24, 24), bool)
+        grid = Grid.from_dense(name, values, held, (-2, -2, -2), transform=transform)
+        for frame in frames:
+            path = smoke / f"ball_{frame:04d}.vdb"
+            with open_vdb(path) as file:
+                grids = [*(file.read(each) for each in file.names if each != name), grid]
+            write_vdb(path, grids)
+
+    return add
+
+
+@pytest.fixture
 def painted(smoke: Path, tmp_path: Path) -> Callable[..., list[Grids]]:
     """Paints the ball as options say."""
     numbers = iter(range(100))

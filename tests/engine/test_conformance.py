@@ -58,12 +58,13 @@ class Problem:
     stencil: FloatArray
     gradient: FloatArray
     domain: Domain
+    steering: FloatArray | None = None
 
     def with_(self, **changes: AnyArray) -> "Problem":
         return dataclasses.replace(self, **changes)
 
     def forward(self, **options: object) -> FloatArray:
-        return native.forward(*self._arrays[:-1], **options)  # pyright: ignore
+        return native.forward(*self._arrays[:-2], self.steering, **options)  # pyright: ignore
 
     def backward(self, **options: object) -> tuple[FloatArray, ...]:
         return native.backward(*self._arrays, **options)  # pyright: ignore
@@ -82,6 +83,7 @@ def problem(
     occupancy: float = 1.0,
     probability: float = 0.5,
     border: Border = "replicate",
+    steered: bool = False,
 ) -> Problem:
     random = np.random.default_rng(4)
 
@@ -103,6 +105,7 @@ def problem(
         stencil(sobel_divisor=30.0),
         draw(n + 1, channels),
         domain,
+        draw(n, 3, 3) if steered else None,
     )
 
 
@@ -124,6 +127,7 @@ def run(update: Update, p: Problem, dtype: torch.dtype, device: str = "cpu") -> 
         tensor(p.priors),
         weights,
         torch.tensor(p.stencil, dtype=torch.promote_types(dtype, torch.float32), device=device),
+        **({} if p.steering is None else {"steering": tensor(p.steering)}),
     )
     gradients = torch.autograd.grad(result, (state, *weights), tensor(p.gradient))
     names = ("state", "to_state", "to_hidden", "to_bias", "to_output")
@@ -165,6 +169,10 @@ CASES = {
     "single brick": {"shape": (8, 8, 8), "hidden": 32},
     "all bricks": {"shape": (16, 8, 16), "hidden": 16},
     "7×9×11": {"shape": (7, 9, 11), "hidden": 96},
+    "steered": {"shape": (9, 8, 33), "hidden": 32, "occupancy": 0.8, "steered": True},
+    "steered, odd": {"channels": 20, "hidden": 17, "priors": 0, "steered": True},
+    "steered, one cell": {"shape": (1, 1, 1), "channels": 5, "probability": 1, "steered": True},
+    "steered, wraps": {"shape": (9, 3, 8), "border": "circular", "steered": True},
 }  # fmt: skip
 
 
@@ -250,7 +258,8 @@ TRITON_CASES = {
 }
 QUICK = ("one cell", "one row of cells", "no cell", "wraps", "wraps onto itself")
 """Cases that take Triton's interpreter about a second, or less."""
-TRITON_CASES |= CASES if GPU else {name: CASES[name] for name in QUICK}
+TRITON_CASES |= {name: CASES[name] for name in (CASES if GPU else QUICK)}
+TRITON_CASES = {name: case for name, case in TRITON_CASES.items() if "steered" not in case}
 
 
 @needs_triton
@@ -276,7 +285,7 @@ def test_the_triton_step_keeps_its_tolerance_with_short_numbers(
     rounded = {
         field.name: torch.tensor(getattr(p, field.name)).to(dtype).float().numpy()
         for field in dataclasses.fields(p)
-        if field.name not in ("rows", "neighbours", "stencil")
+        if field.name not in ("rows", "neighbours", "stencil", "steering")
     }
     p = p.with_(**rounded)
     got = run(triton_update, p, dtype, DEVICE)
@@ -334,8 +343,9 @@ def test_the_mask_drawn_by_triton_has_the_same_bits(probability: float) -> None:
 
 
 @needs_native
-def test_training_gets_the_native_gradients() -> None:
-    p = problem(occupancy=0.6)
+@pytest.mark.parametrize("steered", [False, True])
+def test_training_gets_the_native_gradients(steered: bool) -> None:
+    p = problem(occupancy=0.6, steered=steered)
     got = run(native_update, p, torch.float32)
     assert_conforms(got, run(reference.update, p, torch.float64))
     np.testing.assert_array_equal(got["to_state"], p.backward()[0])
@@ -390,7 +400,8 @@ def test_arrays_in_read_only_memory_can_be_used() -> None:
     p = problem()
     expected = p.forward()
     for field in dataclasses.fields(p):
-        getattr(p, field.name).setflags(write=False)
+        if field.name != "steering":
+            getattr(p, field.name).setflags(write=False)
     np.testing.assert_array_equal(p.forward(), expected)
 
 
@@ -468,3 +479,55 @@ def test_an_output_that_overlaps_the_state_is_refused() -> None:
         p.forward(out=p.state)
     with pytest.raises(ShapeError, match="out: expected shape"):
         p.forward(out=p.state[1:].copy())
+
+
+@pytest.mark.parametrize("backend", ["reference", *KERNELS])
+def test_steered_by_the_identity_cells_do_as_they_do_unsteered(backend: str) -> None:
+    plain = problem(occupancy=0.7)
+    identity = np.broadcast_to(np.eye(3, dtype=np.float32), (len(plain.priors), 3, 3)).copy()
+    if backend == "reference":
+        first, second = (
+            run(reference.update, p, torch.float32)["state"]
+            for p in (plain, plain.with_(steering=identity))
+        )
+    else:
+        options = KERNELS[backend]
+        first, second = (
+            plain.forward(**options),
+            plain.with_(steering=identity).forward(**options),
+        )
+    np.testing.assert_allclose(second, first, atol=1e-6)
+
+
+def test_a_turned_pattern_steered_by_the_turn_does_what_it_did() -> None:
+    """Of a quarter turn, which a grid can have exactly."""
+    p = problem((6, 6, 6), probability=1, priors=0, border="circular")
+    domain = Domain.from_mask(np.ones((6, 6, 6), bool), (0, 0, 0), border="circular")
+
+    def turned(state: FloatArray) -> FloatArray:
+        """At (x, y) is what was at (y, -x): a quarter turn about z."""
+        dense = domain.scatter(state[:-1], domain.box)
+        cells = domain.cells
+        moved = dense[cells[:, 1], -cells[:, 0], cells[:, 2]]
+        return np.concatenate([moved, state[-1:]])
+
+    p = p.with_(neighbours=domain.neighbours)
+    back = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]], np.float32)
+    steering = np.broadcast_to(back, (len(domain), 3, 3)).copy()
+    once = run(reference.update, p, torch.float32)["state"]
+    steered = p.with_(state=turned(p.state), steering=steering)
+    np.testing.assert_allclose(
+        run(reference.update, steered, torch.float32)["state"], turned(once), atol=1e-5
+    )
+
+
+@needs_native
+def test_steering_that_does_not_fit_is_refused_by_name() -> None:
+    p = problem(steered=True)
+    assert p.steering is not None
+    with pytest.raises(ShapeError, match=r"steering: expected shape \[\d+, 3, 3\]"):
+        p.with_(steering=p.steering[:-1].copy()).forward()
+    uneven = p.stencil.copy()
+    uneven[2] *= 2
+    with pytest.raises(ShapeError, match="stencil: to steer, the Sobel filters"):
+        p.with_(stencil=uneven).forward()

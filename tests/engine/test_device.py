@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 import torch
 
-from vnca import engine
 from vnca.core.errors import BackendUnavailableError, OptionError
-from vnca.engine import Compute, choose, compute_of, device_named, tensors
+from vnca.engine import Compute, choose, compute_of, device, device_named, tensors
 from vnca.engine.tensors import WORKSPACE, WORKSPACES, choose_device, require_equal_runs
 from vnca.engine.triton import step as triton
 
@@ -27,14 +26,14 @@ def gpu(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
                 raise problem
             return SimpleNamespace(sum=_Sum)
 
-        monkeypatch.setattr(engine, "_has_driver", lambda: driver)
+        monkeypatch.setattr(device, "_has_driver", lambda: driver)
         monkeypatch.setattr(torch.version, "cuda", "13.2")
         monkeypatch.setattr(torch.version, "hip", None)
         monkeypatch.setattr(torch.cuda, "is_available", lambda: count > 0)
         monkeypatch.setattr(torch.cuda, "device_count", lambda: count)
         monkeypatch.setattr(torch.cuda, "get_device_name", lambda place=None: "NVIDIA Test")
         monkeypatch.setattr(tensors, "torch", _Torch(ones))
-        engine._say_once.cache_clear()
+        device.say_once.cache_clear()
 
     return pretend
 
@@ -55,7 +54,7 @@ class _Sum:
 
 
 def test_auto_is_the_cpu_where_there_is_no_driver(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "_has_driver", lambda: False)
+    monkeypatch.setattr(device, "_has_driver", lambda: False)
     assert device_named("auto") == "cpu"
     assert choose_device("auto") == torch.device("cpu")
 
@@ -119,8 +118,8 @@ def test_a_torch_without_cuda_is_told(
 
 
 def test_on_a_machine_without_torch_auto_is_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "find_spec", lambda name: None)
-    monkeypatch.setattr(engine, "_has_driver", lambda: False)
+    monkeypatch.setattr(device, "find_spec", lambda name: None)
+    monkeypatch.setattr(device, "_has_driver", lambda: False)
     assert device_named("auto") == "cpu"
     with pytest.raises(OptionError, match="it needs torch"):
         device_named("cuda")

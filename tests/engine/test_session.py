@@ -21,7 +21,7 @@ needs_native = pytest.mark.skipif(native.unavailable() is not None, reason="not 
 def no_native(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(native, "_native", None)
     monkeypatch.setattr(native, "_reason", "no compiler", raising=False)
-    sessions._say_once.cache_clear()
+    sessions.say_once.cache_clear()
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def test_unknown_backends_and_devices_are_refused() -> None:
 @pytest.fixture
 def gpu(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(triton, "unavailable", lambda device: None)
-    sessions._say_once.cache_clear()
+    sessions.say_once.cache_clear()
 
 
 @pytest.mark.usefixtures("gpu")
@@ -168,6 +168,33 @@ def test_a_session_steps_alike_on_every_backend(
     np.testing.assert_allclose(results[2], results[0], rtol=1e-4, atol=1e-5)
     np.testing.assert_allclose(results[3], results[1], rtol=1e-4, atol=1e-5)
     assert not np.allclose(results[0], results[1], atol=1e-3)
+
+
+@pytest.mark.parametrize("name", BACKENDS)
+def test_a_steered_session_steps_alike_on_every_backend_that_steers(
+    automaton: tuple[Automaton, Domain, Any, Any], name: str
+) -> None:
+    rule, domain, conditioning, state = automaton
+    steering = np.random.default_rng(1).standard_normal((len(domain), 3, 3)).astype(np.float32)
+    if not backend_named(name).steers:
+        with pytest.raises(BackendUnavailableError, match=f"{name} cannot run: it cannot steer"):
+            open_session(rule, domain, conditioning, Compute(name), steered=True)
+        return
+    results = []
+    for one, gradients in (("reference", True), (name, False)):
+        compute = Compute(one)
+        plain = open_session(rule, domain, conditioning, compute, differentiable=gradients)
+        opened = open_session(
+            rule, domain, conditioning, compute, differentiable=gradients, steered=True
+        ).steered(steering)
+        turned = opened.conditioned(2 * conditioning)
+        results += [
+            session.read(session.run(session.upload(state), range(4, 8)))
+            for session in (opened, turned, plain)
+        ]
+    for ours, theirs in zip(results[3:], results[:3], strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-4)
+    assert not np.allclose(results[0], results[2], atol=1e-3)
 
 
 @pytest.mark.parametrize("name", BACKENDS)

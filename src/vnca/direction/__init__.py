@@ -20,7 +20,8 @@ from vnca.direction.carried import Carried
 from vnca.direction.colour import Editing, require_exchange
 from vnca.direction.colour.fire import emission
 from vnca.direction.colour.grading import graded
-from vnca.direction.grammar import parsed
+from vnca.direction.grammar import parsed, parsed_guide
+from vnca.direction.guides import inwards, steering, unit
 from vnca.direction.mixing import Answer, mixed, per_colour
 from vnca.direction.moment import Inputs, Missing, Moment
 from vnca.direction.shares import completed, is_even
@@ -61,6 +62,11 @@ class Direction:
     pattern_speed: Annotated[Amount | None, Limits(-8, 8)] = None
     """How fast the velocity carries the pattern: 0 not at all, 1 along with the smoke, 2 ahead of
     it; 1 unless given, but 0 for a rule that was taught to move its pattern by itself."""
+    pattern_size: Annotated[Amount, Limits(0.5, 2)] = 1.0
+    """How many times as large the pattern is as in training, from 0.5 to 2."""
+    guide: str | None = None
+    """Along what strokes run: x, y, z or an axis as 0,1,1; velocity, curl or gradient of the smoke;
+    @NAME, a grid of vectors; curve("FILE"); cross(GUIDE, GUIDE); keys of these over frames."""
     hue: Annotated[Amount, Limits(-360, 360)] = 0.0
     """Degrees by which the colours of the painting turn, from red towards yellow."""
     saturation: Annotated[Amount, Limits(0, 10)] = 1.0
@@ -108,6 +114,7 @@ class Direction:
                 raise OptionError(f"`masks` {text!r}: {name!r} is no name; use letters, digits, _")
         for exchange in self.recolour:
             require_exchange(exchange)
+        _ = self.guided  # refused here if it cannot be read
         for name in NUMBERS:
             self._require_limits(name, self.values[name], getattr(self, name))
         for (name, text), value in zip(_entries("layers", self.layers), self.shares, strict=True):
@@ -135,6 +142,41 @@ class Direction:
     def values(self) -> Mapping[str, Value | None]:
         """The value of each number, by its name; None for one that is not given."""
         return {name: self._value(name, getattr(self, name)) for name in NUMBERS}
+
+    @cached_property
+    def guided(self) -> Value | None:
+        """The guide; None without one."""
+        return None if self.guide is None else parsed_guide(self.guide, "guide")
+
+    @property
+    def steers(self) -> bool:
+        """Whether the pattern may be turned or another size anywhere."""
+        return self.guided is not None or self.values["pattern_size"] != Constant(1.0)
+
+    def steering(self, moment: Moment, cells: AnyArray) -> FloatArray | None:
+        """By what cells `[n, 3]` are steered, see `guides.steering`; None if they are not.
+
+        Raises:
+            GridError: If the size is out of its limits, or a grid is not there.
+        """
+        if not self.steers:
+            return None
+        size = self.value("pattern_size", moment, cells)
+        if self.guided is None:
+            return steering(None, None, size, len(cells))
+        directions = unit(np.asarray(self.guided.at(moment, cells)))
+        return steering(directions, inwards(moment, cells), size, len(cells))
+
+    @property
+    def substeps(self) -> int:
+        """In how many shorter steps a step is to be done.
+
+        A pattern k times as large spreads k² times as fast in cells: steps as long as they were
+        taught would be unstable.
+        """
+        size = self.values["pattern_size"]
+        most = 1.0 if size is None else min(size.most, NUMBERS["pattern_size"].high)
+        return math.ceil(max(1.0, most) ** 2 - _ROUNDING)
 
     @cached_property
     def shares(self) -> tuple[Value, ...]:
@@ -165,7 +207,7 @@ class Direction:
     def parts(self) -> Iterator[Value]:
         """All values that are asked for, and what they are made of."""
         mixes = (value for option in MIXES for value in self.mixes[option])
-        for value in (*self.values.values(), *self.shares, *mixes):
+        for value in (*self.values.values(), self.guided, *self.shares, *mixes):
             if value is not None:
                 yield from value.parts()
 

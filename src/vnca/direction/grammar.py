@@ -11,12 +11,14 @@ from typing import Any, NamedTuple, NoReturn, get_args, get_type_hints
 
 from vnca.core.errors import OptionError, TextError
 from vnca.direction.carried import Advected, Age
+from vnca.direction.guides import NATURAL, Across, Axis, Natural
+from vnca.direction.guides.curve import Curve
+from vnca.direction.guides.grid import VectorGrid
 from vnca.direction.masks.grids import FileGrid, Grid
 from vnca.direction.masks.mesh import Solid
 from vnca.direction.masks.picture import Picture
 from vnca.direction.masks.shapes import Ball, Cuboid
 from vnca.direction.values import (
-    OPERATIONS,
     SOURCES,
     Constant,
     Keys,
@@ -36,6 +38,9 @@ CALLS: Mapping[str, type[Value]] = {
     "advected": Advected,
 }
 """What is called by name; its fields are what it is given, in their order."""
+GUIDES: Mapping[str, type[Value]] = {"curve": Curve, "cross": Across}
+"""The same where directions are expected."""
+_AXES = {"x": Axis(1, 0, 0), "y": Axis(0, 1, 0), "z": Axis(0, 0, 1)}
 _JOINED = ("min", "max")
 _SHAPES: tuple[str, ...] = get_args(Shape)
 _NUMBER = r"(?:\d+(?:\.(?!\.)\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
@@ -72,6 +77,19 @@ def parsed(text: str, name: str, masks: Mapping[str, Value] | None = None) -> Va
     return _Reader(text, name, masks or {}).whole()
 
 
+def parsed_guide(text: str, name: str) -> Value:
+    """The guide that a text stands for.
+
+    Args:
+        text: The text.
+        name: What messages call it.
+
+    Raises:
+        TextError: If it cannot be read.
+    """
+    return _Reader(text, name, {}, of_directions=True).whole()
+
+
 def rebased(text: str, folder: Any) -> str:
     """The same with the paths of files in it that are relative, as of a folder."""
     parts, end = [], 0
@@ -100,8 +118,11 @@ def _tokens(text: str, name: str) -> list[_Token]:
 
 
 class _Reader:
-    def __init__(self, text: str, name: str, masks: Mapping[str, Value]) -> None:
+    def __init__(
+        self, text: str, name: str, masks: Mapping[str, Value], *, of_directions: bool = False
+    ) -> None:
         self._text, self._name, self._masks = text, name, masks
+        self._one = self._direction if of_directions else self._sum
         self._tokens = _tokens(text, name)
         self._next = self._depth = 0
 
@@ -141,7 +162,7 @@ class _Reader:
         shape: Any = "linear"
         if self._token.text in _SHAPES and self._tokens[self._next + 1].kind == "key":
             shape = self._taken().text
-        value = self._keys(shape) if self._token.kind == "key" else self._sum()
+        value = self._keys(shape) if self._token.kind == "key" else self._one()
         self._depth -= 1
         return value
 
@@ -157,8 +178,44 @@ class _Reader:
                     token.at,
                 )
             frames.append(frame)
-            values.append(self._sum())
+            values.append(self._one())
         return Keys(tuple(frames), tuple(values), shape)
+
+    def _direction(self) -> Value:
+        token = self._token
+        if self._skipped("("):
+            value = self._value()
+            self._closed(token)
+            return value
+        if token.kind == "grid":
+            return VectorGrid(self._taken().text[1:].strip("\"'"))
+        if token.kind == "number" or token.text == "-":
+            return self._axis(token)
+        if token.kind != "name":
+            self._expected("a direction")
+        name = self._taken().text
+        if name in GUIDES:
+            return self._called(token, GUIDES[name])
+        if name in NATURAL:
+            return Natural(name)
+        if name not in _AXES:
+            known = ", ".join([*_AXES, *NATURAL, *(f"{each}(…)" for each in GUIDES)])
+            self._refused(
+                f"{name!r} is no direction; expected {known}, three numbers, or @ and a grid of "
+                "vectors",
+                token.at,
+            )
+        return _AXES[name]
+
+    def _axis(self, token: _Token) -> Value:
+        numbers = [self._number()]
+        for _ in range(2):
+            if not self._skipped(","):
+                self._expected("three numbers with commas, as in 0,1,1")
+            numbers.append(self._number())
+        if not any(numbers):
+            self._refused("expected a direction; of three zeros there is none", token.at)
+        return Axis(*numbers)
 
     def _sum(self) -> Value:
         value = self._product()
@@ -226,14 +283,18 @@ class _Reader:
         if name not in (*CALLS, *_JOINED):
             known = ", ".join([*SOURCES, "age", *(f"{each}(…)" for each in (*CALLS, *_JOINED))])
             self._refused(f"{name!r} is not known; expected {known}, or @ and a name", token.at)
+        return self._called(token, CALLS.get(name))
+
+    def _called(self, token: _Token, kind: type[Value] | None) -> Value:
+        """What comes of a name and what it is given; values are joined where it is no kind."""
         opening = self._token
         if not self._skipped("("):
-            self._expected(f"what {name} is given, in parentheses")
+            self._expected(f"what {token.text} is given, in parentheses")
         given, named = self._arguments()
         self._closed(opening)
-        if name in OPERATIONS:
+        if kind is None:
             return self._joined(token, given, named)
-        return self._made(token, given, named)
+        return self._made(kind, token, given, named)
 
     def _closed(self, opening: _Token) -> None:
         if not self._skipped(")"):
@@ -271,9 +332,12 @@ class _Reader:
         return value
 
     def _made(
-        self, token: _Token, given: list[tuple[Any, int]], named: dict[str, tuple[Any, int]]
+        self,
+        kind: type[Value],
+        token: _Token,
+        given: list[tuple[Any, int]],
+        named: dict[str, tuple[Any, int]],
     ) -> Value:
-        kind = CALLS[token.text]
         wanted, hints = fields(kind), get_type_hints(kind)  # type: ignore[arg-type]
         names = [field.name for field in wanted]
         if len(given) > len(names):

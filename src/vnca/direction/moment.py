@@ -89,6 +89,12 @@ class Moment:
         """Points of our world in the world of the file."""
         return points[..., _FILE_AXES[self.inputs.up]]
 
+    def in_cells(self, directions: AnyArray) -> AnyArray:
+        """Directions `[n, 3]` of the world of the file along the axes of the smoke's cells."""
+        ours = np.empty_like(directions)
+        ours[..., _FILE_AXES[self.inputs.up]] = directions
+        return ours @ np.linalg.inv(self.smoke.index_to_world[:3, :3]).T
+
     @property
     def is_smoke(self) -> Field:
         """The cells that count as smoke."""

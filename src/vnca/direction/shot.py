@@ -117,7 +117,7 @@ class Shot:
     def _rebased(self, asked: Direction) -> Iterator[tuple[str, Any]]:
         """Those fields of a direction in which there are paths."""
         folder = self.path.parent
-        for name in NUMBERS:
+        for name in (*NUMBERS, "guide"):
             value = getattr(asked, name)
             if isinstance(value, str):
                 yield name, rebased(value, folder)

@@ -4,16 +4,10 @@ A backend is one file or folder here, with a `BACKEND` in it, and its name in `B
 sessions, which hold all that a step needs where it is computed; and decodes their states.
 """
 
-import ctypes
-import re
-import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +15,7 @@ import numpy as np
 from vnca.core import FloatArray
 from vnca.core.errors import BackendUnavailableError, OptionError
 from vnca.engine.automaton import Automaton, Weights
+from vnca.engine.device import device_named, say_once
 from vnca.engine.domain import Domain
 
 BACKENDS = ("native", "triton", "wgsl", "numpy", "reference")
@@ -104,6 +99,14 @@ class Session(ABC):
     def conditioned(self, conditioning: Any) -> "Session":
         """The same automaton on the same cells, conditioned on something else, `[n, P]`."""
 
+    def steered(self, steering: Any) -> "Session":
+        """The same with what each cell perceives turned and scaled by a matrix, `[n, 3, 3]`.
+
+        It perceives F ∇s and |F|²/3 · ∇²s: by a rotation, as if all around it were turned by that;
+        by k, as if it were k times as small, so that the pattern becomes k times as large.
+        """
+        raise NotImplementedError(f"{type(self).__name__} of a backend that does not steer")
+
     def run(self, state: Any, numbers: range, watch: Callable[[], None] | None = None) -> Any:
         """The state after the steps of some numbers; `watch` is called after each."""
         for number in numbers:
@@ -127,6 +130,7 @@ class StepSession(Session):
         update: The step, called as `vnca.engine.reference.equations.update` is.
         place: Brings an array to where it is computed.
         back: Brings one from there.
+        steering: `[n, 3, 3]`; None where cells are not steered.
     """
 
     automaton: Automaton
@@ -138,6 +142,7 @@ class StepSession(Session):
     update: Callable[..., Any]
     place: Callable[[Any], Any]
     back: Callable[[Any], FloatArray]
+    steering: Any = None
 
     @classmethod
     def open(
@@ -167,6 +172,10 @@ class StepSession(Session):
         """See `Session.conditioned`."""
         return replace(self, conditioning=self.place(conditioning))
 
+    def steered(self, steering: Any) -> "StepSession":
+        """See `Session.steered`."""
+        return replace(self, steering=self.place(steering))
+
     def upload(self, state: FloatArray) -> Any:
         """See `Session.upload`."""
         return self.place(state)
@@ -180,8 +189,9 @@ class StepSession(Session):
             step=number,
             probability=automaton.update_probability,
         )
-        surroundings = (self.neighbours, self.conditioning)
-        return self.update(state, rows, *surroundings, automaton.weights, self.stencil)
+        how = (self.neighbours, self.conditioning, automaton.weights, self.stencil)
+        steering = {} if self.steering is None else {"steering": self.steering}
+        return self.update(state, rows, *how, **steering)
 
     def read(self, state: Any) -> FloatArray:
         """See `Session.read`."""
@@ -207,14 +217,20 @@ class Backend(ABC):
         name: As a user asks for it.
         precisions: Those it can round the factors of its products to.
         has_gradients: Whether its sessions can be differentiable.
+        steers: Whether they can be steered.
     """
 
     name: str
     precisions: tuple[str, ...] = ("float32",)
     has_gradients = True
+    steers = False
 
-    def unavailable(self, compute: Compute, *, differentiable: bool = False) -> str | None:
+    def unavailable(
+        self, compute: Compute, *, differentiable: bool = False, steered: bool = False
+    ) -> str | None:
         """Why it cannot compute so here, or nothing if it can."""
+        if steered and not self.steers:
+            return "it cannot steer patterns; use native, numpy or reference"
         if differentiable and not self.has_gradients:
             return "it has no gradients; use reference"
         if compute.precision not in self.precisions:
@@ -254,40 +270,6 @@ class Backend(ABC):
         return backend_named("numpy").array_decode(threads=threads)
 
 
-def device_named(name: str) -> str:
-    """The device of a name, as `Compute` takes it: `cpu`, `cuda` or such as `cuda:1`.
-
-    `auto` is a GPU where torch can compute on one, else the CPU; why it is the CPU although there
-    is a driver for NVIDIA's GPUs is said once on stderr.
-
-    Raises:
-        OptionError: If there is no such device, or torch cannot compute on it.
-    """
-    if name == "cpu":
-        return name
-    if name.partition(":")[0] == "mps":
-        raise OptionError(
-            f"`device` {name}: there are no kernels for Apple's GPUs; the native one works on the "
-            "CPU of a Mac: use cpu"
-        )
-    if not re.fullmatch(r"auto|cuda(:\d{1,3})?", name):
-        raise OptionError(f"`device` {name}: expected auto, cpu, cuda, or such as cuda:1")
-    if find_spec("torch") is None:
-        reason = "it needs torch; install vnca[train]"
-    elif name == "auto" and not _has_driver():
-        return "cpu"
-    else:
-        # Torch takes seconds to import: only where there may be a GPU.
-        reason = import_module("vnca.engine.tensors").why_no_gpu(name.replace("auto", "cuda"))
-    if reason is None:
-        return name.replace("auto", "cuda")
-    if name != "auto":
-        raise OptionError(f"`device` {name}: {reason}; use auto or cpu")
-    if _has_driver():
-        _say_once(f"vnca: computing on the CPU: {reason}")
-    return "cpu"
-
-
 def compute_of(backend: str, device: str, precision: str = "float32") -> Compute:
     """How to compute as a user asks, where the device may be left to what is there.
 
@@ -301,48 +283,40 @@ def compute_of(backend: str, device: str, precision: str = "float32") -> Compute
     return Compute(backend, device_named(device), precision)
 
 
-def _has_driver() -> bool:
-    """Whether a driver is installed without which torch finds no GPU."""
-    for library in ("libcuda.so.1", "nvcuda.dll", "libamdhip64.so"):
-        with suppress(OSError):
-            ctypes.CDLL(library)
-            return True
-    return False
-
-
 def backend_named(name: str) -> Backend:
     """A registered backend, of a name in `BACKENDS`."""
     return import_module(f"vnca.engine.{name}").BACKEND
 
 
-def choose(compute: Compute, *, differentiable: bool = False) -> Backend:
-    """The backend to run.
+def choose(compute: Compute, *, differentiable: bool = False, steered: bool = False) -> Backend:
+    """The backend to run; one that can be differentiated or steered if that is asked for.
 
     `auto` says once on stderr what it takes if that is no fast one, or if it computes on a GPU.
 
     Raises:
         BackendUnavailableError: If the backend asked for cannot run here, or not so.
     """
+    asked = {"differentiable": differentiable, "steered": steered}
     if compute.backend != "auto":
         backend = backend_named(compute.backend)
-        reason = backend.unavailable(compute, differentiable=differentiable)
+        reason = backend.unavailable(compute, **asked)
         if reason is not None:
             raise BackendUnavailableError(f"backend {backend.name} cannot run: {reason}")
         return backend
     on_cpu = compute.device_type == "cpu"
     fast = backend_named("native" if on_cpu else "triton")
-    reason = fast.unavailable(compute, differentiable=differentiable)
+    reason = fast.unavailable(compute, **asked)
     if reason is None:
         if not on_cpu:
-            _say_once(f"vnca: running the {fast.name} step on {compute.device_type}")
+            say_once(f"vnca: running the {fast.name} step on {compute.device_type}")
         return fast
     slow = backend_named("numpy" if on_cpu and not differentiable else "reference")
-    problem = slow.unavailable(compute, differentiable=differentiable)
+    problem = slow.unavailable(compute, **asked)
     if problem is not None:
         raise BackendUnavailableError(
             f"no backend can run: {fast.name}: {reason}; {slow.name}: {problem}"
         )
-    _say_once(f"vnca: running the slow {slow.name} step: {reason}")
+    say_once(f"vnca: running the slow {slow.name} step: {reason}")
     return slow
 
 
@@ -353,6 +327,7 @@ def open_session(
     compute: Compute | None = None,
     *,
     differentiable: bool = False,
+    steered: bool = False,
 ) -> Session:
     """An automaton on a domain, ready to run.
 
@@ -362,12 +337,13 @@ def open_session(
         conditioning: `[n, P]` of the cells, an array or, for a differentiable session, a tensor.
         compute: How to compute; the fastest way on the CPU unless given.
         differentiable: Whether states are tensors through which gradients flow.
+        steered: Whether cells are to be steered: see `Session.steered`.
 
     Raises:
         BackendUnavailableError: If what was asked for cannot run here.
     """
     compute = compute or Compute()
-    backend = choose(compute, differentiable=differentiable)
+    backend = choose(compute, differentiable=differentiable, steered=steered)
     return backend.session(Job(automaton, domain, conditioning, compute, differentiable))
 
 
@@ -393,8 +369,3 @@ def array_decode(backend: str = "auto", *, threads: int | None = None) -> ArrayD
     # Triton and the reference decode tensors only: what they computed is read back first.
     backend = {"triton": "auto", "reference": "numpy"}.get(backend, backend)
     return choose(Compute(backend)).array_decode(threads=threads)
-
-
-@cache
-def _say_once(line: str) -> None:
-    print(line, file=sys.stderr)

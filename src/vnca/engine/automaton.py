@@ -9,7 +9,7 @@ finaliser is Wellons' `lowbias32` (2018), a 32-bit bijection of low bias.
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,6 +71,13 @@ class Automaton:
     stencil: FloatArray
     update_probability: float
     seed: int
+
+    def slowed(self, times: int) -> "Automaton":
+        """One whose steps change cells so many times less."""
+        if times == 1:
+            return self
+        weights = self.weights._replace(output=self.weights.output / np.float32(times))
+        return replace(self, weights=weights)
 
 
 def mix(value: HashArray) -> HashArray:

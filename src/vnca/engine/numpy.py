@@ -26,6 +26,7 @@ def update(
     priors: FloatArray,
     weights: Weights,
     stencil: FloatArray,
+    steering: FloatArray | None = None,
 ) -> FloatArray:
     """The state `[n + 1, C]` after one step; arguments are those of the reference."""
     hidden, bias, output = weights
@@ -33,6 +34,10 @@ def update(
     for start in range(0, len(rows), SLAB):
         slab = rows[start : start + SLAB]
         perception = np.tensordot(stencil, state[neighbours[:, slab]], axes=1)
+        if steering is not None:
+            turn = steering[slab]
+            perception[1:4] = np.einsum("nij,jnc->inc", turn, perception[1:4])
+            perception[4] *= np.square(turn).sum((1, 2))[:, None] / 3
         inputs = np.concatenate([*perception, priors[slab]], axis=1)
         result[slab] += np.maximum(inputs @ hidden.T + bias, 0) @ output.T
     return result
@@ -102,6 +107,7 @@ class NumpyBackend(Backend):
 
     name = "numpy"
     has_gradients = False
+    steers = True
 
     def missing(self, compute: Compute) -> str | None:
         """See `Backend.missing`."""

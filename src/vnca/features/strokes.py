@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter, gaussian_filter1d
 from torch.nn import functional
 
 from vnca.core import AnyArray, BoolArray, FloatArray
@@ -31,6 +31,7 @@ _WIDTH = pi * sqrt(1 / (2 * _GAMMA))  # of a stripe, in units of the blur it sta
 _BESIDE = 0.6  # pixels between a point of a ridge and its crest, at most
 _AWAY = 3.0  # blurs from the border of what is shown, at least: beyond it is something else
 _FAINTEST = 0.01  # contrast that is structure, of 0 to 1
+_AROUND = 3.0  # of the window in which directions agree, in units of the blur
 
 
 class Ridges(NamedTuple):
@@ -80,6 +81,34 @@ def find_ridges(values: AnyArray, where: BoolArray | None = None) -> Ridges:
 def distance_inside(where: BoolArray) -> AnyArray:
     """How far each pixel is from those that are not chosen, or from the border, `[r, c]`."""
     return np.asarray(distance_transform_edt(np.pad(where, 1)))[1:-1, 1:-1]
+
+
+def structure_tensor(
+    colours: AnyArray, shown: BoolArray, blur: float
+) -> tuple[AnyArray, AnyArray, AnyArray]:
+    """The structure tensor where it is shown: cos and sin of twice the direction, and its trace.
+
+    Args:
+        colours: `[r, c, n]`.
+        shown: `[r, c]`.
+        blur: Of the gradients, pixels.
+
+    Returns:
+        Three of `[r, c]`; the direction, towards growing columns and rows, is across strokes.
+
+    Reference: Förstner and Gülch 1987; Di Zenzo 1986 (of a colour picture).
+    """
+
+    def slope(axis: int) -> AnyArray:
+        along = gaussian_filter1d(colours, blur, axis=axis, order=1)
+        return gaussian_filter1d(along, blur, axis=1 - axis) * shown[..., None]
+
+    rows, columns = slope(0), slope(1)
+    xx, yy, xy = (
+        gaussian_filter((one * other).sum(-1), _AROUND * blur)
+        for one, other in ((columns, columns), (rows, rows), (rows, columns))
+    )
+    return xx - yy, 2 * xy, xx + yy
 
 
 def stroke_width(picture: FloatArray) -> float | None:

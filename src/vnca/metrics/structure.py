@@ -11,11 +11,11 @@ from math import log2
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, gaussian_filter1d, gaussian_laplace
+from scipy.ndimage import gaussian_laplace
 from scipy.spatial import KDTree
 
 from vnca.core import AnyArray, BoolArray, FloatArray
-from vnca.features.strokes import distance_inside, find_ridges
+from vnca.features.strokes import distance_inside, find_ridges, structure_tensor
 from vnca.metrics.setup import Pair
 from vnca.metrics.style import StyleMetric, directions, normalised_score, perceived
 from vnca.metrics.style_score import FEWEST_OPAQUE
@@ -26,7 +26,6 @@ PATCH = 7
 """Rows and columns of a patch, pixels."""
 
 _SCALES = (1.0, 2.0, 4.0)  # blurs of the gradients, pixels
-_AROUND = 3.0  # of the window in which directions agree, in units of the blur
 _AWAY = 2.0  # blurs between a gradient and what is not shown
 _REGIONS = 8  # along the shorter side of the picture
 _DIRECTIONS = 64  # in which regions are compared
@@ -65,7 +64,7 @@ def structure(picture: FloatArray, where: BoolArray | None = None) -> Structure:
     lines, weights, directions = 0.0, 0.0, np.zeros(BINS)
     for blur in _SCALES:
         shown = inside > _AWAY * blur
-        across, turned, total = _tensor(colours, shown, blur)
+        across, turned, total = structure_tensor(colours, shown, blur)
         agreement = np.hypot(across, turned)[shown]
         lines += float(agreement.sum())
         weights += float(total[shown].sum())
@@ -192,21 +191,6 @@ def _apart(asked: AnyArray, known: AnyArray, tree: KDTree) -> float:
         return 0.0
     there, back = tree.query(asked)[0], KDTree(asked).query(known)[0]
     return float(np.mean(there) + np.mean(back))
-
-
-def _tensor(colours: AnyArray, shown: BoolArray, blur: float) -> tuple[AnyArray, ...]:
-    """The structure tensor where it is shown: cos and sin of twice the direction, and its trace."""
-
-    def slope(axis: int) -> AnyArray:
-        along = gaussian_filter1d(colours, blur, axis=axis, order=1)
-        return gaussian_filter1d(along, blur, axis=1 - axis) * shown[..., None]
-
-    rows, columns = slope(0), slope(1)
-    xx, yy, xy = (
-        gaussian_filter((one * other).sum(-1), _AROUND * blur)
-        for one, other in ((columns, columns), (rows, rows), (rows, columns))
-    )
-    return xx - yy, 2 * xy, xx + yy
 
 
 def _contrast(lightness: AnyArray, inside: AnyArray) -> float:

@@ -150,8 +150,9 @@ class Roll:
         if len(domain) == 0:
             return Ready(smoke, domain, None, rule, layers=layers)
         conditioning = priors(domain, smoke, rule)
-        automaton = rule.automaton(self.config.seed)
-        session = open_session(automaton, domain, conditioning, self.compute)
+        automaton = rule.automaton(self.config.seed).slowed(self.config.substeps)
+        what = (automaton, domain, conditioning, self.compute)
+        session = open_session(*what, steered=self.config.steers)
         return Ready(smoke, domain, session, rule, conditioning if self.styles else None, layers)
 
     def paint(self, smoke: Volume | Ready, state: RollState) -> Painting:
@@ -207,7 +208,11 @@ class Roll:
             session = session.conditioned(in_shares(ready.conditioning, self.rule, shares))
         if session is None:
             return RollState.empty(self.rule.config.channels, state.steps_done)
+        steering = self.config.steering(moment, domain.cells)
+        if steering is not None:
+            session = session.steered(steering)
         warmup = self.config.warmup if len(state.cells) == 0 else 0
+        warmup *= self.config.substeps
         done = state.steps_done + warmup
         steps = self._steps(moment, domain)
         fewest, most = int(np.min(steps)), int(np.max(steps))
@@ -223,9 +228,9 @@ class Roll:
     def _steps(self, moment: Moment, domain: Domain) -> AnyArray | int:
         """How many steps the cells do, all as many or each its own, `[n]`."""
         if self.config.steps_per_frame is None:
-            return self.rule.config.steps_per_frame
+            return self.rule.config.steps_per_frame * self.config.substeps
         asked: Answer = self.config.value("steps_per_frame", moment, domain.cells)
-        return np.rint(asked).astype(int) * self.grid
+        return np.rint(asked).astype(int) * self.grid * self.config.substeps
 
     def _begun(self, ready: Ready, state: RollState, moment: Moment) -> FloatArray:
         """What the cells of a frame begin with, of the state that the one before it left."""

@@ -133,7 +133,7 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
     require_dense_enough(sequence, smoke, rule.scales.density)
     rule = placed(rule, region, watch)
     compute = compute_of(options.backend, options.device, options.precision)
-    backend = choose(compute).name
+    backend = choose(compute, steered=options.config.steers).name
     ready = directed(
         Roll(rule, options.config, region.box, compute), model, options.refine, sequence, smoke
     )

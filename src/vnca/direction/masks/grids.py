@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,19 +26,30 @@ _VDB = ".vdb"
 
 
 class Stored(NamedTuple):
-    """A grid of numbers, and where it lies.
+    """A grid of numbers or vectors, and where it lies.
 
     Attributes:
         values: Of its cells.
         known: Which of them have a value.
-        background: What holds everywhere else.
+        background: What holds everywhere else: a number, or `[3]`.
         to_world: 4×4, from its index coordinates to our world.
+        is_staggered: Whether components of vectors lie on the lower faces of the cells.
     """
 
     values: Field
     known: Field
-    background: float
+    background: Any
     to_world: AnyArray
+    is_staggered: bool = False
+
+    def components(self) -> Iterator["Stored"]:
+        """Of a grid of vectors, each as a grid of numbers."""
+        background = np.broadcast_to(self.background, 3)
+        for axis in range(3):
+            matrix = self.to_world.copy()
+            matrix[:3, 3] -= 0.5 * self.is_staggered * matrix[:3, axis]
+            values = replace(self.values, values=self.values.values[..., axis], outside=0)
+            yield Stored(values, self.known, background[axis], matrix)
 
     def at(self, moment: Moment, places: AnyArray) -> Answer:
         """Its values at places of a frame: straight between those cells that have one.
@@ -76,19 +87,7 @@ class Grid(Value):
 
     def at(self, moment: Moment, places: AnyArray) -> Answer:
         """See `Value.at`."""
-        smoke = moment.smoke
-        if not len(places):
-            return 0.0
-        if self.name in smoke.named_fields:
-            held = smoke.named_fields[self.name]
-            if held.values.ndim > 4:
-                raise GridError(
-                    f"frame {smoke.frame}: @{self.name} holds vectors, expected numbers"
-                )
-            known = replace(held, values=held.values != 0, outside=False)
-            known = known.union(moment.is_smoke)
-            return Stored(held, known, 0.0, smoke.index_to_world).at(moment, places)
-        stored = _stored(moment.inputs, moment.frame, moment.inputs.paths, self.name)
+        stored = _of_frame(moment, self.name, vectors=False) if len(places) else None
         return 0.0 if stored is None else stored.at(moment, places)
 
     def require(self, inputs: Inputs) -> None:
@@ -98,7 +97,34 @@ class Grid(Value):
             GridError: If a frame lacks it, or all do; or it holds no numbers.
             FileFormatError: If a file cannot be read.
         """
-        _require(inputs, inputs.paths, self.name)
+        require_grid(inputs, inputs.paths, self.name)
+
+
+def stored_vectors(moment: Moment, name: str) -> list[Stored] | None:
+    """The three components of a grid of vectors of a frame; None where it is not, and zero holds.
+
+    Raises:
+        GridError: If there is none, and something has to be; or it holds numbers.
+    """
+    stored = _of_frame(moment, name, vectors=True)
+    return None if stored is None else [*stored.components()]
+
+
+def _of_frame(moment: Moment, name: str, *, vectors: bool) -> Stored | None:
+    """A grid that a frame has, or its file."""
+    smoke = moment.smoke
+    if name in smoke.named_fields:
+        held = smoke.named_fields[name]
+        known = replace(held, values=held.values != 0, outside=False)
+        if held.values.ndim > 4:
+            known = replace(known, values=known.values.any(axis=-1))
+        stored = Stored(held, known.union(moment.is_smoke), 0.0, smoke.index_to_world)
+    else:
+        stored = _stored(moment.inputs, moment.frame, moment.inputs.paths, name)
+    if stored is not None and (stored.values.values.ndim > 4) is not vectors:
+        held, wanted = ("numbers", "vectors") if vectors else ("vectors", "numbers")
+        raise GridError(f"frame {smoke.frame}: @{name} holds {held}, expected {wanted}")
+    return stored
 
 
 @dataclass(frozen=True)
@@ -128,7 +154,7 @@ class FileGrid(Value):
                 raise SequenceError(
                     f"{self.path}: no file for frame {lacking[0]}; choose `missing` zero or hold"
                 )
-        _require(inputs, paths, self.name)
+        require_grid(inputs, paths, self.name)
 
     def files(self, inputs: Inputs) -> Iterator[Path]:
         """What it reads."""
@@ -188,10 +214,11 @@ def _read_now(inputs: Inputs, path: Path, name: str) -> Stored | None:
             return None
         values, known = grid.fields(box)
         matrix = upright_world(header.transform.index_to_world, inputs.up)
-        background = float(grid.tree.background)
+        background = np.asarray(grid.tree.background, np.float64)
+        is_staggered = header.grid_class == "staggered"
     found = single_precision(values.values, path, f"grid {header.name!r}", stored=known.values)
-    background = background if np.isfinite(background) else 0.0
-    return Stored(replace(values, values=found), known, background, matrix)
+    background = np.where(np.isfinite(background), background, 0)
+    return Stored(replace(values, values=found), known, background, matrix, is_staggered)
 
 
 def _header(named: Mapping[str, GridHeader], name: str) -> GridHeader | None:
@@ -201,8 +228,14 @@ def _header(named: Mapping[str, GridHeader], name: str) -> GridHeader | None:
     return next((h for h in named.values() if not h.value_type.startswith("vec")), None)
 
 
-def _require(inputs: Inputs, paths: Paths, name: str) -> None:
-    lacking = [path for path in paths.values() if not _has(path, name)]
+def require_grid(inputs: Inputs, paths: Paths, name: str, *, vectors: bool = False) -> None:
+    """Refuse a grid of numbers, or of vectors, that frames lack, as their headers tell.
+
+    Raises:
+        GridError: If a frame lacks it, or all do; or it is of the other kind.
+        FileFormatError: If a file cannot be read.
+    """
+    lacking = [path for path in paths.values() if not _has(path, name, vectors)]
     if lacking and inputs.missing == "stop":
         raise GridError(
             f"{lacking[0]}: no grid {name!r}{_among(lacking[0])}, or one without values; name a "
@@ -220,7 +253,7 @@ def _among(path: Path) -> str:
         return f" among {file.listed()}"
 
 
-def _has(path: Path, name: str) -> bool:
+def _has(path: Path, name: str, vectors: bool) -> bool:
     """Whether a file has values of a grid, by its headers; what is broken painting tells."""
     if path.suffix.lower() != _VDB:
         return False
@@ -228,7 +261,8 @@ def _has(path: Path, name: str) -> bool:
         header = _header(file.grids, name)
         if header is None:
             return not file.grids  # a frame without smoke
-        if header.value_type.startswith("vec"):
-            raise GridError(f"{path}: grid {header.name!r} holds vectors, expected numbers")
+        if header.value_type.startswith("vec") is not vectors:
+            held, wanted = ("numbers", "vectors") if vectors else ("vectors", "numbers")
+            raise GridError(f"{path}: grid {header.name!r} holds {held}, expected {wanted}")
         return header.box is None or not header.box.is_empty
     return True

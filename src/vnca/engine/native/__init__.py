@@ -98,6 +98,7 @@ def forward(
     bias: FloatArray,
     output: FloatArray,
     stencil: FloatArray,
+    steering: FloatArray | None = None,
     *,
     threads: int | None = None,
     out: FloatArray | None = None,
@@ -116,7 +117,10 @@ def forward(
         hidden: W1 `[H, 5C + P]`, H at most 512.
         bias: b1 `[H]`.
         output: W2 `[C, H]`.
-        stencil: `[5, 27]` from `vnca.engine.automaton`, with any divisors.
+        stencil: `[5, 27]` from `vnca.engine.automaton`, with any divisors; one of all three Sobel
+            filters where cells are steered.
+        steering: `[n, 3, 3]` matrices F: perceived gradients are multiplied by F, the Laplacian by
+            |F|² / 3. Without them nothing is.
         threads: How many to use; by default one for each core.
         out: `[n + 1, C]` to write to; by default a new array.
         precision: What the factors of W1 [z ‖ priors] and W2 relu(…) are rounded to.
@@ -133,7 +137,7 @@ def forward(
     """
     if out is None:
         out = np.empty_like(state)
-    arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, out)
+    arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, steering, out)
     options = (threads or default_threads(), precision == "bfloat16", instructions)
     checked("update step", extension(precision).forward, *arguments, *options)
     return out
@@ -149,6 +153,7 @@ def backward(
     output: FloatArray,
     stencil: FloatArray,
     gradient: FloatArray,
+    steering: FloatArray | None = None,
     *,
     threads: int | None = None,
     precision: str = "float32",
@@ -162,7 +167,8 @@ def backward(
     those of `forward`.
     """
     results = tuple(np.empty_like(array) for array in (state, hidden, bias, output))
-    arguments = (state, rows, neighbours, priors, hidden, bias, output, stencil, gradient)
+    fixed = (rows, neighbours, priors, hidden, bias, output, stencil, steering)
+    arguments = (state, *fixed, gradient)
     options = (threads or default_threads(), precision == "bfloat16", instructions)
     checked("update step", extension(precision).backward, *arguments, *results, *options)
     to_state, to_hidden, to_bias, to_output = results
@@ -352,6 +358,7 @@ class NativeBackend(Backend):
 
     name = "native"
     precisions = PRECISIONS
+    steers = True
 
     def missing(self, compute: Compute) -> str | None:
         """See `Backend.missing`."""

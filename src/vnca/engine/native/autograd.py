@@ -6,7 +6,6 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from vnca.core import AnyArray
 from vnca.engine import native
 from vnca.engine.automaton import DecoderWeights, Weights
 
@@ -18,6 +17,7 @@ def update(
     priors: Tensor,
     weights: Weights,
     stencil: Tensor,
+    steering: Tensor | None = None,
     *,
     threads: int | None = None,
     precision: str = "float32",
@@ -34,6 +34,7 @@ def update(
         priors: `[n, P]`.
         weights: W1, b1 and W2.
         stencil: `[5, 27]` perception filters.
+        steering: `[n, 3, 3]`; see `vnca.engine.native.forward`.
         threads: How many to use; by default one for each core.
         precision: What the factors of the products are rounded to, forward and backward.
 
@@ -41,7 +42,8 @@ def update(
         BackendUnavailableError: If the native kernel was not built, or has no such precision here.
         ShapeError: If shapes, types or indices are not as above.
     """
-    result = _Update.apply(state, rows, neighbours, priors, *weights, stencil, threads, precision)
+    fixed = (rows, neighbours, priors, *weights, stencil, steering)
+    result = _Update.apply(state, *fixed, threads, precision)
     assert isinstance(result, Tensor)
     return result
 
@@ -65,13 +67,14 @@ class _Update(torch.autograd.Function):
     def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
         ctx: Any, *grad_outputs: Tensor
     ) -> tuple[Tensor | None, ...]:
-        arrays = map(_array, (*ctx.saved_tensors, *grad_outputs))
+        *tensors, steering = ctx.saved_tensors
+        arrays = map(_array, (*tensors, *grad_outputs, steering))
         to_state, *to_weights = map(torch.from_numpy, native.backward(*arrays, **ctx.options))
-        return to_state, None, None, None, *to_weights, None, None, None
+        return to_state, None, None, None, *to_weights, None, None, None, None
 
 
-def _array(tensor: Tensor) -> AnyArray:
-    return tensor.detach().contiguous().numpy()
+def _array(tensor: Tensor | None) -> Any:
+    return None if tensor is None else tensor.detach().contiguous().numpy()
 
 
 def decode(

@@ -24,6 +24,7 @@ def forward(
     priors: FloatArray,
     automaton: Automaton,
     step: int,
+    steering: FloatArray | None = None,
     *,
     threads: int | None = None,
     out: FloatArray | None = None,
@@ -41,6 +42,7 @@ def forward(
         priors: `[n, P]`, P at most 16.
         automaton: Weights, at most 512 hidden units, filters and mask.
         step: Its number, from which the mask follows.
+        steering: `[n, 3, 3]`; see `vnca.engine.native.forward`.
         threads: How many to use; by default one for each core.
         out: `[n + 1, C]` to write to; by default a new array.
         precision: What the factors of the products are rounded to.
@@ -56,7 +58,7 @@ def forward(
         out = np.empty_like(state)
     probability = automaton.update_probability
     mask = (int(mask_key(automaton.seed, step)), int(mask_threshold(probability)), probability >= 1)
-    arrays = (priors, *automaton.weights, automaton.stencil, out)
+    arrays = (priors, *automaton.weights, automaton.stencil, steering, out)
     options = (threads or default_threads(), precision == "bfloat16", instructions)
     function = extension(precision).forward_bricks
     checked("update step", function, state, *around, hashes, *mask, *arrays, *options)
@@ -73,6 +75,7 @@ class BrickSession(Session):
         hashes: `[n]` for the mask, the bits as int32.
         conditioning: `[n, P]`.
         options: `threads` and `precision`.
+        steering: `[n, 3, 3]`; None where cells are not steered.
     """
 
     automaton: Automaton
@@ -80,6 +83,7 @@ class BrickSession(Session):
     hashes: IntArray
     conditioning: FloatArray
     options: dict[str, Any]
+    steering: FloatArray | None = None
 
     @classmethod
     def open(cls, job: Job) -> "BrickSession":
@@ -91,6 +95,10 @@ class BrickSession(Session):
     def conditioned(self, conditioning: Any) -> "BrickSession":
         """See `Session.conditioned`."""
         return replace(self, conditioning=np.asarray(conditioning))
+
+    def steered(self, steering: Any) -> "BrickSession":
+        """See `Session.steered`."""
+        return replace(self, steering=np.asarray(steering))
 
     def upload(self, state: FloatArray) -> FloatArray:
         """See `Session.upload`."""
@@ -119,4 +127,5 @@ class BrickSession(Session):
 
     def _step(self, state: FloatArray, number: int, out: FloatArray | None) -> FloatArray:
         surroundings = (self.around, self.hashes, self.conditioning)
-        return forward(state, *surroundings, self.automaton, number, out=out, **self.options)
+        how = (self.automaton, number, self.steering)
+        return forward(state, *surroundings, *how, out=out, **self.options)

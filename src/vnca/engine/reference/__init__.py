@@ -11,6 +11,7 @@ class ReferenceBackend(Backend):
     """Runs wherever torch does, slowly."""
 
     name = "reference"
+    steers = True
 
     def missing(self, compute: Compute) -> str | None:
         """See `Backend.missing`."""

@@ -16,29 +16,45 @@ SLAB = 4096
 """Cells worked through at a time: their perception and hidden layer stay in cache."""
 
 
-def perceive(neighbourhood: Tensor, stencil: Tensor) -> Tensor:
+def perceive(neighbourhood: Tensor, stencil: Tensor, steering: Tensor | None = None) -> Tensor:
     """Perception z: the cell's state, its gradient along x, y and z, and its Laplacian.
+
+    Steered by F, a cell perceives F ∇s and |F|²/3 · ∇²s: by a rotation, what it would perceive if
+    all around it had been turned by that; by a multiple k, if it had shrunk k times.
 
     Args:
         neighbourhood: `[27, cells, C]` states around each cell, in the order of `OFFSETS`.
         stencil: `[5, 27]`.
+        steering: `[cells, 3, 3]`.
 
     Returns:
         `[cells, 5C]`, one filter after the other.
 
-    Reference: VNCA, equation for z_ijk.
+    Reference: VNCA, equation for z_ijk; Randazzo et al. 2023, "Growing Steerable Neural Cellular
+    Automata", section 3 (turned gradients).
     """
     _, cells, channels = neighbourhood.shape
     filtered = (stencil @ neighbourhood.flatten(1)).view(len(stencil), cells, channels)
+    if steering is not None:
+        state, gradient, laplacian = filtered[0], filtered[1:4], filtered[4]
+        gradient = torch.einsum("nij,jnc->inc", steering, gradient)
+        laplacian = steering.square().sum((1, 2))[:, None] / 3 * laplacian
+        filtered = torch.cat([state[None], gradient, laplacian[None]])
     return filtered.transpose(0, 1).flatten(1)
 
 
-def change(neighbourhood: Tensor, priors: Tensor, weights: Weights, stencil: Tensor) -> Tensor:
+def change(
+    neighbourhood: Tensor,
+    priors: Tensor,
+    weights: Weights,
+    stencil: Tensor,
+    steering: Tensor | None = None,
+) -> Tensor:
     """∂s/∂t `[cells, C]` = W2 relu(W1 [z ‖ priors] + b1).
 
     Reference: VNCA, equation for ∂s_ijk/∂t, with the velocity that its text and figure have.
     """
-    z = torch.cat([perceive(neighbourhood, stencil), priors], dim=1)
+    z = torch.cat([perceive(neighbourhood, stencil, steering), priors], dim=1)
     hidden = torch.relu(torch.addmm(weights.bias, z, weights.hidden.t()))
     return hidden @ weights.output.t()
 
@@ -50,6 +66,7 @@ def update(
     priors: Tensor,
     weights: Weights,
     stencil: Tensor,
+    steering: Tensor | None = None,
 ) -> Tensor:
     """The state after one step: s' = s + change on `rows`, s elsewhere.
 
@@ -64,11 +81,12 @@ def update(
         priors: `[n, P]`.
         weights: W1, b1 and W2.
         stencil: `[5, 27]` perception filters.
+        steering: `[n, 3, 3]`; see `perceive`.
 
     Returns:
         `[n + 1, C]`.
     """
-    result = _Update.apply(state, rows, neighbours, priors, *weights, stencil)
+    result = _Update.apply(state, rows, neighbours, priors, *weights, stencil, steering)
     assert isinstance(result, Tensor)
     return result
 
@@ -85,26 +103,30 @@ class _Update(torch.autograd.Function):
         bias: Tensor,
         output: Tensor,
         stencil: Tensor,
+        steering: Tensor | None,
     ) -> Tensor:
-        ctx.save_for_backward(state, rows, neighbours, priors, hidden, bias, output, stencil)
+        fixed = (rows, neighbours, priors, hidden, bias, output, stencil, steering)
+        ctx.save_for_backward(state, *fixed)
         weights = Weights(hidden, bias, output)
         result = state.clone()
         for slab in rows.split(SLAB):
             around = _gather(state, neighbours, slab)
-            result[slab] += change(around, priors[slab], weights, stencil)
+            turned = None if steering is None else steering[slab]
+            result[slab] += change(around, priors[slab], weights, stencil, turned)
         return result
 
     @staticmethod
     def backward(ctx: Any, *grad_outputs: Tensor) -> tuple[Tensor | None, ...]:
         (gradient,) = grad_outputs
-        state, rows, neighbours, priors, *matrices, stencil = ctx.saved_tensors
+        state, rows, neighbours, priors, *matrices, stencil, steering = ctx.saved_tensors
         weights = Weights(*(matrix.detach().requires_grad_() for matrix in matrices))
         to_state = gradient.clone()
         to_weights = [torch.zeros_like(matrix) for matrix in matrices]
         for slab in rows.split(SLAB):
             around = _gather(state, neighbours, slab).requires_grad_()
+            turned = None if steering is None else steering[slab]
             with torch.enable_grad():
-                changed = change(around, priors[slab], weights, stencil)
+                changed = change(around, priors[slab], weights, stencil, turned)
             to_around, *slab_weights = torch.autograd.grad(
                 changed, (around, *weights), gradient[slab]
             )
@@ -112,7 +134,7 @@ class _Update(torch.autograd.Function):
             for total, part in zip(to_weights, slab_weights, strict=True):
                 total += part
         to_state[-1] = 0  # the outside is a constant
-        return to_state, None, None, None, *to_weights, None
+        return to_state, None, None, None, *to_weights, None, None
 
 
 def _gather(state: Tensor, neighbours: Tensor, rows: Tensor) -> Tensor:

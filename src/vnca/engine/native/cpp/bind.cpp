@@ -2,12 +2,14 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,7 +56,8 @@ void read_scales(const float* stencil, float* scale) {
 
 // The arrays of a step, checked but for where neighbours are.
 Step step_of(std::int64_t n, const Input& state, const Input& priors, const Input& first,
-             const Input& bias, const Input& second, const Input& stencil) {
+             const Input& bias, const Input& second, const Input& stencil,
+             const std::optional<Input>& steering) {
     const std::int64_t c = length(state, 1), p = length(priors, 1), h = length(first, 0);
     Step step;
     step.state = data_of<float>(state, "state", {n + 1, c == 0 ? ANY : c});
@@ -68,6 +71,12 @@ Step step_of(std::int64_t n, const Input& state, const Input& priors, const Inpu
     step.bias = data_of<float>(bias, "hidden bias", {h});
     step.second = data_of<float>(second, "output weights", {c, h});
     read_scales(data_of<float>(stencil, "stencil", {FILTERS, NEIGHBOURS}), step.scale);
+    if (steering) {
+        step.steering = data_of<float>(*steering, "steering", {n, 3, 3});
+        // Turned as whole numbers, see `perceive`.
+        if (step.scale[1] != step.scale[2] || step.scale[1] != step.scale[3])
+            throw nb::value_error("stencil: to steer, the Sobel filters must have one divisor");
+    }
     step.cells = n;
     step.channels = int(c);
     step.hidden = int(h);
@@ -82,8 +91,9 @@ struct Arrays {
 
     Arrays(const Input& state, const Input& rows_array, const Input& neighbours,
            const Input& priors, const Input& first, const Input& bias, const Input& second,
-           const Input& stencil)
-        : step(step_of(length(neighbours, 1), state, priors, first, bias, second, stencil)) {
+           const Input& stencil, const std::optional<Input>& steering)
+        : step(step_of(length(neighbours, 1), state, priors, first, bias, second, stencil,
+                       steering)) {
         step.neighbours =
             data_of<std::int32_t>(neighbours, "neighbours", {NEIGHBOURS, step.cells});
         rows = {data_of<std::int32_t>(rows_array, "rows", {ANY}), length(rows_array, 0)};
@@ -106,6 +116,12 @@ struct Arrays {
                                    std::to_string(step.cells)).c_str());
     }
 };
+
+// Places in memory, and that of an array that may not be there.
+std::vector<Extent> with(std::vector<Extent> extents, const std::optional<Input>& array) {
+    if (array) extents.emplace_back(*array);
+    return extents;
+}
 
 // Kernels that this machine can run and that multiply numbers of the given kind, fastest first.
 std::vector<const Kernel*> kernels_for(bool bfloat16) {
@@ -172,13 +188,14 @@ NB_MODULE(_native, m) {
     });
 
     m.def("forward", [](Input state, Input rows, Input neighbours, Input priors, Input first,
-                        Input bias, Input second, Input stencil, Output out, int threads,
-                        bool bfloat16, const std::string& instructions) {
-        const Arrays arrays(state, rows, neighbours, priors, first, bias, second, stencil);
+                        Input bias, Input second, Input stencil, const std::optional<Input>& steering,
+                        Output out, int threads, bool bfloat16, const std::string& instructions) {
+        const Arrays arrays(state, rows, neighbours, priors, first, bias, second, stencil, steering);
         const Step& step = arrays.step;
         const Kernel& kernel = kernel_named(instructions, bfloat16);
         float* const to = data_of<float>(out, "out", {step.cells + 1, step.channels});
-        check_apart({out}, {state, rows, neighbours, priors, first, bias, second, stencil});
+        check_apart({out}, with({state, rows, neighbours, priors, first, bias, second, stencil},
+                                steering));
         bool valid;
         {
             nb::gil_scoped_release released;
@@ -190,10 +207,11 @@ NB_MODULE(_native, m) {
 
     m.def("forward_bricks", [](Input state, Input around, Input places, Input hashes,
                                std::uint32_t key, std::uint32_t threshold, bool all, Input priors,
-                               Input first, Input bias, Input second, Input stencil, Output out,
-                               int threads, bool bfloat16, const std::string& instructions) {
+                               Input first, Input bias, Input second, Input stencil,
+                               const std::optional<Input>& steering, Output out, int threads,
+                               bool bfloat16, const std::string& instructions) {
         const std::int64_t n = length(places, 0), count = length(around, 0);
-        const Step step = step_of(n, state, priors, first, bias, second, stencil);
+        const Step step = step_of(n, state, priors, first, bias, second, stencil, steering);
         const Kernel& kernel = kernel_named(instructions, bfloat16);
         const Bricks bricks = {
             count,
@@ -204,7 +222,8 @@ NB_MODULE(_native, m) {
         const auto* const hashed = data_of<std::int32_t>(hashes, "hashes", {n});
         const Mask mask = {all ? nullptr : hashed, key, threshold};
         float* const to = data_of<float>(out, "out", {step.cells + 1, step.channels});
-        check_apart({out}, {state, around, places, hashes, priors, first, bias, second, stencil});
+        check_apart({out}, with({state, around, places, hashes, priors, first, bias, second,
+                                 stencil}, steering));
         bool valid;
         {
             nb::gil_scoped_release released;
@@ -217,10 +236,10 @@ NB_MODULE(_native, m) {
     });
 
     m.def("backward", [](Input state, Input rows, Input neighbours, Input priors, Input first,
-                         Input bias, Input second, Input stencil, Input gradient,
-                         Output to_state, Output to_first, Output to_bias, Output to_second,
+                         Input bias, Input second, Input stencil,
+                         const std::optional<Input>& steering, Input gradient, Output to_state, Output to_first, Output to_bias, Output to_second,
                          int threads, bool bfloat16, const std::string& instructions) {
-        const Arrays arrays(state, rows, neighbours, priors, first, bias, second, stencil);
+        const Arrays arrays(state, rows, neighbours, priors, first, bias, second, stencil, steering);
         const Step& step = arrays.step;
         const Kernel& kernel = kernel_named(instructions, bfloat16);
         const std::vector<std::int64_t> shape = {step.cells + 1, step.channels};
@@ -232,7 +251,8 @@ NB_MODULE(_native, m) {
             data_of<float>(to_second, "gradient of the output weights", {step.channels, step.hidden}),
         };
         check_apart({to_state, to_first, to_bias, to_second},
-                    {state, rows, neighbours, priors, first, bias, second, stencil, gradient});
+                    with({state, rows, neighbours, priors, first, bias, second, stencil, gradient},
+                         steering));
         bool valid;
         {
             nb::gil_scoped_release released;

@@ -156,10 +156,20 @@ struct Weights {
 // z of one cell, from what is around it: at(o), in the order of OFFSETS, gives the first of its
 // channels, a vector of which is `apart` floats from the next.
 template <class At>
-INLINE void perceive_cell(const Layout& layout, const At& at, std::size_t apart, Number* z) {
+INLINE void perceive_cell(const Layout& layout, const At& at, std::size_t apart,
+                          const Steering* steering, Number* z) {
     // From the last vector of channels to the first, see the end of `perceive`.
     for (int v = int(layout.wide_channels) / LANES; v-- > 0;)
-        perceive([&](int o) { return load(at(o) + v * apart); }, z + v * LANES, layout.channels);
+        perceive([&](int o) { return load(at(o) + v * apart); }, steering, z + v * LANES,
+                 layout.channels);
+}
+
+// Calls use(steering) with how a cell is steered, null if it is not.
+template <class Use>
+INLINE void steered(const Step& s, std::int64_t row, const Use& use) {
+    if (s.steering == nullptr) return use(nullptr);
+    const Steering steering(s.steering + 9 * row);
+    use(&steering);
 }
 
 // Priors of one cell, and a one, which the gradient of the bias meets.
@@ -180,7 +190,10 @@ void perceive_block(const Step& s, const Layout& at, const Weights& weights, con
                     Matrix z) {
     const States states = states_of(s, at, weights);
     for (int i = 0; i < block.count; ++i) {
-        perceive_cell(at, [&](int o) { return states.at(block.around[o][i]); }, LANES, z.row(i));
+        steered(s, block.rows[i], [&](const Steering* steering) {
+            perceive_cell(at, [&](int o) { return states.at(block.around[o][i]); }, LANES, steering,
+                          z.row(i));
+        });
         append_priors(s, block.rows[i], z.row(i) + at.filtered);
     }
 }
@@ -242,8 +255,10 @@ bool forward_bricks(const Step& s, const float* packed, const Bricks& bricks, co
             const std::int64_t row = chosen[i], place = bricks.places[row] - lowest;
             if (place < FARTHEST || place >= HALOED - FARTHEST) return false;
             const float* const here = around + place * LANES;
-            perceive_cell(at, [&](int o) { return here + step_to(o) * LANES; }, HALOED * LANES,
-                          z.row(waiting));
+            steered(s, row, [&](const Steering* steering) {
+                perceive_cell(at, [&](int o) { return here + step_to(o) * LANES; }, HALOED * LANES,
+                              steering, z.row(waiting));
+            });
             append_priors(s, row, z.row(waiting) + at.filtered);
             fetch(states, next, i * portion, (i + 1) * portion);
             rows[waiting++] = std::int32_t(row);
@@ -296,11 +311,14 @@ void backward(const Step& s, const float* packed, const Block& block, const floa
              weights.first_back,
              [&](int i, int j, Vec v) { store(to_z + i * at.wide_filtered + j, v); });
     for (int i = 0; i < block.count; ++i)
-        for (int c = 0; c < int(at.wide_channels); c += LANES)
-            spread(to_z + i * at.wide_filtered + c, at.channels, [&](int o, Vec v) {
-                float* const to = state + block.slots[o][i] * std::int64_t(at.wide_channels) + c;
-                store(to, load(to) + v);
-            });
+        steered(s, block.rows[i], [&](const Steering* steering) {
+            for (int c = 0; c < int(at.wide_channels); c += LANES)
+                spread(to_z + i * at.wide_filtered + c, steering, at.channels, [&](int o, Vec v) {
+                    const auto slot = std::int64_t(block.slots[o][i]);
+                    float* const to = state + slot * at.wide_channels + c;
+                    store(to, load(to) + v);
+                });
+        });
 }
 
 double multiply_adds(std::int64_t rounds) {

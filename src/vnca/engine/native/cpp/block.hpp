@@ -23,6 +23,7 @@ struct Step {
     const float* bias;               // b1 [hidden]
     const float* second;             // W2 [channels, hidden]
     float scale[FILTERS];            // of each filter over its integer form, see `perceive`
+    const float* steering = nullptr;  // [cells, 3, 3] of those that are steered, else null
 
     int inputs() const { return FILTERS * channels + priors; }
 };
