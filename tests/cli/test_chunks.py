@@ -141,7 +141,7 @@ def test_a_state_of_another_rule_or_lattice_is_refused(
     for path in smoke.iterdir():
         volume = read_smoke(path)
         matrix = volume.index_to_world @ np.diag([2.0, 2, 2, 1])
-        write_smoke(path, type(volume)(volume.density, None, volume.origin, matrix))
+        write_smoke(path, replace(volume, index_to_world=matrix))
     assert "the place of its cells in the world is another" in chunks.run("out", *asked).complaint
 
 
