@@ -259,7 +259,7 @@ def test_parts_of_a_painting_are_done_one_by_one(vnca: Vnca, smoke: Path, tmp_pa
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--style", "ink", "--chunk", "1"], "needs --only paint"),
+        (["--style", "ink", "--chunk", "1"], "--chunk: needs --only paint"),
         (["--style", "ink", "--only", "train"], "ink is a model, which is trained already"),
         (["--style", "ink", "--only", "film", "--without-film"], "one of them, not both"),
         (["picture.png", "--only", "paint"], "no model to paint with yet; --only train first"),

@@ -84,8 +84,9 @@ class PaintRun:
     def __post_init__(self) -> None:
         if self.without_film and (shaped := changed_fields(self.film, FilmConfig())):
             raise OptionError(f"`film.{shaped[0]}`, `without_film`: one of them, not both")
-        if self.chunking != Chunking() and self.only != "paint":
-            raise OptionError("`chunking`: needs `only` paint, as a chunk is no whole film")
+        part = changed_fields(self.chunking, Chunking())
+        if part and self.only != "paint":
+            raise OptionError(f"`{part[0]}`: needs `only` paint, as a chunk is no whole film")
         if self.only == "film" and self.without_film:
             raise OptionError("`only` film, `without_film`: one of them, not both")
         if self.style is not None:
