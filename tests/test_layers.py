@@ -20,7 +20,7 @@ RANKS = {
     "metrics": 7, "bench": 7, "viewer": 7,
     "peers": 7,
     "recipe": 8,
-    "comparison": 9,
+    "comparison": 9, "farm": 9,
     "cli": 10, "__main__": 11,
 }  # fmt: skip
 WITHOUT_TORCH = {"core", "rule", "io", "simulation", "direction", "painting"}

@@ -153,7 +153,7 @@ def test_a_timed_training_misses_velocity_too(
     def far_enough(*_: object, **__: object) -> None:
         raise OptionError("far enough")
 
-    monkeypatch.setattr("vnca.cli.bench_torch.measure_training", far_enough)
+    monkeypatch.setattr("vnca.cli.bench.training.measure_training", far_enough)
     command = ("bench", "train", "--frame", frame, "--style", style, "--device", "cpu")
     lines = vnca(*command).err.splitlines()
     missing = f"{frame}: no velocity in this frame; choose with --velocity-grid from wind"

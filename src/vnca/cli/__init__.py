@@ -24,6 +24,9 @@ COMMANDS = {
     "peers": "stylize smoke with other published methods, to compare with",
     "render": "make a film or a turntable of a sequence",
     "view": "watch rules paint, live in a browser",
+    "farm": "write a job that trains, paints and films shots on many machines",
+    "sweep": "train on a table of pictures, settings and seeds, in a report",
+    "plan": "predict what painting a sequence takes, from its headers",
     "bench": "time steps, training and painting on this machine",
     "info": "describe a volume file, a model or a training run",
 }
@@ -32,6 +35,8 @@ HOMES = {name: f"{name}:run" for name in COMMANDS} | {
     "stylize": "paint:run_stylize",
     "render": "paint:run_render",
     "ablate": "evaluate:run_ablate",
+    "sweep": "farm:run_sweep",
+    "plan": "farm:run_plan",
 }
 """The function of each command, as `module:function` of this package."""
 

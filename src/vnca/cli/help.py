@@ -66,6 +66,7 @@ COMMON: Mapping[str, tuple[str, ...]] = {
         "overwrite",
     ),
     "view": ("frames", "export", "page-fps", "browser", "port", *_SMOKE),
+    "farm": ("out", "chunk-size", "handover", "styles", "seeds", "program", "env", "retries"),
     "bench step": ("backends", "threads", "json", "csv"),
     "bench train": ("preset", "backends", "device", "threads", "repeats", "json", "csv"),
     "bench paint": ("grid", "occupancy", "precisions", "device", "threads", "json", "csv"),
@@ -73,7 +74,8 @@ COMMON: Mapping[str, tuple[str, ...]] = {
 }
 """The options that `--help` shows of a command, in its order; of others it shows all."""
 JSON_PROGRESS = "--json-progress"
-NAMES: dict[str, str] = dict.fromkeys(("config", "rule", "smoke", "grow", "film", "direction"), "")
+_FLAT = ("config", "rule", "smoke", "grow", "film", "direction", "chunking", "chunks")
+NAMES: dict[str, str] = dict.fromkeys(_FLAT, "")
 """What options of fields are called where it is not as the field; empty for a dataclass whose
 fields are options as if they were of the one around it."""
 SHOT_NAMES = {"fps": "film-fps", "step": "ray-step"}

@@ -152,9 +152,7 @@ class Progress:
             note=note,
         ):
             return
-        line = (
-            f"{self._what} {done}/{self._total} {self._unit}  {rate}  {_clock(left)} left  {note}"
-        )
+        line = f"{self._what} {done}/{self._total} {self._unit}  {rate}  {clock(left)} left  {note}"
         if self._terminal:
             print(f"\r\x1b[K{line.rstrip()}", end="", file=sys.stderr, flush=True)
             _line_is_open = True
@@ -170,7 +168,8 @@ def tracked(items: Iterable[T], what: str, total: int, unit: str) -> Iterator[T]
             progress.show(done + 1)
 
 
-def _clock(seconds: float) -> str:
+def clock(seconds: float) -> str:
+    """A time as `1:02:03`, or `2:03` if it is under an hour."""
     minutes, seconds = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"

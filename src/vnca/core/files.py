@@ -142,3 +142,12 @@ def existing_file(path: Path) -> Path:
     if not os.access(path, os.R_OK):
         raise FileFormatError(f"{path}: no permission to read it")
     return path
+
+
+def cache_folder() -> Path:
+    """The folder of what can be made again; it may not exist yet."""
+    if own := os.environ.get("VNCA_CACHE"):
+        return Path(own)
+    if shared := os.environ.get("XDG_CACHE_HOME"):
+        return Path(shared) / "vnca"
+    return Path.home() / ".cache" / "vnca"

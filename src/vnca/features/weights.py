@@ -9,7 +9,6 @@ was subtracted.
 import dataclasses
 import importlib
 import json
-import os
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -24,7 +23,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from vnca.core.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
-from vnca.core.files import existing_file, whole_file
+from vnca.core.files import cache_folder, existing_file, whole_file
 from vnca.features.download import download, file_sha256, installed_file
 
 _WIDTHS = (64, 128, 256, 512, 512)
@@ -138,15 +137,6 @@ def save_weights(weights: Weights, path: Path) -> None:
     }
     with whole_file(path) as temporary:
         save_file(tensors, temporary, metadata=header)
-
-
-def cache_folder() -> Path:
-    """The folder of cached weights; it may not exist yet."""
-    if own := os.environ.get("VNCA_CACHE"):
-        return Path(own)
-    if shared := os.environ.get("XDG_CACHE_HOME"):
-        return Path(shared) / "vnca"
-    return Path.home() / ".cache" / "vnca"
 
 
 def _edges() -> Weights:

@@ -38,7 +38,6 @@ def report(
         picture: The style picture, linear RGB `[r, c, 3]`.
         facts: What was measured, on what and by what: a line each.
     """
-    style = files("vnca.metrics").joinpath("report.css").read_text()
     last = survey.strip[-1]
     sections = [
         f"<h1>{escape(facts['title'])}</h1>",
@@ -48,9 +47,9 @@ def report(
             if name != "title"
         ),
         '<div class="first">',
-        _figure(fit(picture, _STYLE_SIZE, _STYLE_SIZE), "the picture"),
-        _figure(_shown(last.pair.painted), f"frame {last.frame}, painted"),
-        _figure(_shown(last.pair.plain), f"frame {last.frame} as it comes, lit from above"),
+        figure(fit(picture, _STYLE_SIZE, _STYLE_SIZE), "the picture"),
+        figure(_shown(last.pair.painted), f"frame {last.frame}, painted"),
+        figure(_shown(last.pair.plain), f"frame {last.frame} as it comes, lit from above"),
         "</div>",
         _table(listed),
         *_style(survey),
@@ -59,11 +58,17 @@ def report(
         *_motion(survey.turn.texture, survey.turn.frame),
         *_density(survey),
     ]
+    return page(facts["title"], sections)
+
+
+def page(title: str, sections: Iterable[str]) -> str:
+    """A page of sections in HTML, which needs nothing else."""
+    style = files("vnca.metrics").joinpath("report.css").read_text()
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<link rel="icon" href="data:,">\n'
-        f"<title>{escape(facts['title'])}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
+        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
         + "\n".join(sections)
         + "\n</body>\n</html>\n"
     )
@@ -258,7 +263,7 @@ def _row(label: str, values: Sequence[float | None]) -> str:
 def _grid(rows: Sequence[Sequence[tuple[AnyArray, str]]], inside: tuple[slice, slice]) -> str:
     """Pictures with captions, of each the part that is wanted."""
     columns = len(rows[0])
-    cells = "".join(_figure(picture[inside], caption) for row in rows for picture, caption in row)
+    cells = "".join(figure(picture[inside], caption) for row in rows for picture, caption in row)
     return f'<div class="strip" style="grid-template-columns:repeat({columns},1fr)">{cells}</div>'
 
 
@@ -272,7 +277,8 @@ def _around_smoke(pairs: Iterable[Pair]) -> tuple[slice, slice]:
     return slice(lower[0], upper[0]), slice(lower[1], upper[1])
 
 
-def _figure(picture: AnyArray, caption: str) -> str:
+def figure(picture: AnyArray, caption: str) -> str:
+    """A picture, linear RGB `[r, c, 3]`, with what is written below it, if there is something."""
     encoded = BytesIO()
     Image.fromarray(to_srgb8(picture)).save(encoded, "WEBP", quality=90, method=4)
     data = base64.b64encode(encoded.getvalue()).decode()

@@ -180,6 +180,16 @@ class Roll:
         shares = self.config.mix("blend", range(1, count), count, moment, nowhere)
         return blended((self.rule, *self.blend), shares)
 
+    def passed(
+        self, smoke: Volume | Ready, state: RollState, at: Moment | None = None
+    ) -> RollState:
+        """What a frame leaves to the next, unpainted; see `paint`."""
+        ready = smoke if isinstance(smoke, Ready) else self.ready(smoke)
+        moment = at or self._moment(ready.smoke, state.carried)
+        each = zip(self.layers, ready.layers, state.layers, strict=True)
+        layers = tuple(layer.passed(on, left, moment) for layer, on, left in each)
+        return replace(self._advanced(ready, state, moment), carried=moment.carried, layers=layers)
+
     def _moment(self, smoke: Volume, carried: Carried | None) -> Moment:
         """A frame as the direction is asked about it, and what smoke carried to it."""
         threshold = SMOKE_THRESHOLD * self.rule.scales.density

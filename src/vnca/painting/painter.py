@@ -27,6 +27,7 @@ from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import up_axis_of
 from vnca.io.vdb import VdbFile
 from vnca.painting import Ready, Roll, RollState
+from vnca.painting.chunk import WHOLE, Chunk
 from vnca.painting.frames import VelocityCheck, read_ahead
 from vnca.painting.unfinished import Source, Unfinished
 
@@ -104,6 +105,7 @@ class Painter:
         tell: Is given lines for the user.
         refine: How many times as fine as the smoke's the grid of the painting is.
         facts: What else files tell of their painting, beside how opaque it is to be seen.
+        chunk: Which of the frames are painted, and how they follow those before.
     """
 
     sequence: FrameSequence
@@ -117,16 +119,22 @@ class Painter:
     tell: Callable[[str], None]
     refine: int = 1
     facts: Mapping[str, str | int | float] = field(default_factory=dict)
+    chunk: Chunk = WHOLE
     _velocity: VelocityCheck = field(init=False)
 
     def __post_init__(self) -> None:
         check = VelocityCheck(self.roll.rule, self.smoke, self.tell)
         object.__setattr__(self, "_velocity", check)
 
+    @cached_property
+    def frames(self) -> tuple[Frame, ...]:
+        """Those that are painted."""
+        return self.sequence[self.chunk.first : self.chunk.stop]
+
     @property
     def unfinished_path(self) -> Path:
         """Where the state is kept: named after the first frame, as several may share a folder."""
-        return self.out / f".{self.sequence[0].path.stem}.resume.safetensors"
+        return self.out / f".{self.frames[0].path.stem}.resume.safetensors"
 
     def target(self, frame: Frame) -> Path:
         """The file a frame is painted to."""
@@ -151,18 +159,21 @@ class Painter:
             OutputError: If the folder cannot be written, or holds frames that are not to be
                 replaced.
         """
-        path = self.unfinished_path
-        remove_leftovers(self.out, {self.target(f).name for f in self.sequence} | {path.name})
+        path, first, left = self.unfinished_path, self.chunk.first, self.chunk.state_out
+        remove_leftovers(self.out, {self.target(f).name for f in self.frames} | {path.name})
         if path.exists() and resume:
             unfinished = Unfinished.load(path, self.conditions, self.roll)
             self._require_unchanged(unfinished.sources)
-            self.tell(f"{self.out}: going on after {len(unfinished.sources)} frames")
+            done = max(0, len(unfinished.sources) - first)
+            self.tell(f"{self.out}: going on after {done} frames")
             return unfinished
         if resume and self._is_complete():
-            self.tell(f"{self.out}: all {len(self.sequence)} frames are painted already")
-            sources = tuple(self._source(at) for at in range(len(self.sequence)))
-            return Unfinished(self.conditions, sources, self.roll.start())
-        there = [target for target in map(self.target, self.sequence) if target.exists()]
+            self.tell(f"{self.out}: all {len(self.frames)} frames are painted already")
+            if left is not None:
+                return Unfinished.load(left, self.conditions, self.roll, handed_over=True)
+            sources = tuple(self._source(first + at) for at in range(len(self.frames)))
+            return Unfinished(self.conditions, (None,) * first + sources, self.roll.start())
+        there = [target for target in map(self.target, self.frames) if target.exists()]
         if path.exists() and not overwrite:
             raise OutputError(
                 f"{self.out}: holds a painting that was interrupted; go on with `resume`, or "
@@ -176,11 +187,13 @@ class Painter:
             )
         if resume:
             self.tell(f"{self.out}: nothing unfinished there; starting with the first frame")
-        return Unfinished(self.conditions, (), self.roll.start())
+        return self.chunk.start(self.sequence, self.conditions, self.roll)
 
     def _is_complete(self) -> bool:
         """Whether every frame is there, painted by this rule in this way from what it is now."""
-        for frame in self.sequence:
+        if self.chunk.state_out is not None and not self.chunk.state_out.exists():
+            return False
+        for frame in self.frames:
             target = self.target(frame)
             if not target.exists() or not frame.path.exists():
                 return False
@@ -206,15 +219,17 @@ class Painter:
         """
         sources, state = list(unfinished.sources), unfinished.state
         saved, due, start = len(sources), 0.0, len(sources)
-        loads = (partial(self._read, at) for at in range(start, len(self.sequence)))
+        stop, first = self.chunk.first + len(self.frames), self.chunk.first
+        loads = (partial(self._read, at) for at in range(start, stop))
         reads = read_ahead(loads, unwanted=_close)
         held = self._held(sources)
         try:
-            for frame, source in zip(self.sequence, sources, strict=False):
+            for frame, source in zip(self.frames, sources[first:], strict=False):
                 yield self.target(frame) if source else None
-            for frame, read in zip(self.sequence[start:], reads, strict=True):
+            for frame, read in zip(self.sequence[start:stop], reads, strict=True):
                 try:
-                    before, (held, state, source) = held, self._finish(frame, read, held, state)
+                    left = Unfinished(self.conditions, tuple(sources), state)
+                    before, (held, state, source) = held, self._finish(frame, read, held, left)
                 finally:
                     if held is not read:
                         _close(read)
@@ -226,7 +241,10 @@ class Painter:
                     Unfinished(self.conditions, tuple(sources), state).save(self.unfinished_path)
                     saved, ended = len(sources), time.monotonic()
                     due = ended + (ended - begun) / _SAVING_SHARE
-                yield self.target(frame) if source else None
+                if len(sources) > first:
+                    yield self.target(frame) if source else None
+            if self.chunk.state_out is not None:
+                Unfinished(self.conditions, tuple(sources), state).save(self.chunk.state_out)
         finally:
             reads.close()
             _close(held)
@@ -239,33 +257,36 @@ class Painter:
         remove_file(self.unfinished_path)
 
     def _finish(
-        self, frame: Frame, read: _Read | VncaError, held: _Read | None, state: RollState
+        self, frame: Frame, read: _Read | VncaError, held: _Read | None, left: Unfinished
     ) -> tuple[_Read | None, RollState, Source | None]:
         """Paint a frame or do what is to be done if it is broken."""
         try:
             if isinstance(read, VncaError):
                 raise read
-            state = self._write(frame, read, state)
+            state = self._write(frame, read, left)
             return read if self.on_error == "hold" else None, state, read.source
         except BROKEN as error:
             if self.on_error == "stop":
                 raise
             if self.on_error == "hold" and held is not None:
                 self.tell(f"{error}; holding frame {held.frame.number} in its place")
-                return held, self._write(frame, held, state), held.source
+                return held, self._write(frame, held, left), held.source
             self.tell(f"{error}; leaving it out")
-            remove_file(self.target(frame))
-            return held, state, None
+            if frame in self.frames:
+                remove_file(self.target(frame))
+            return held, left.state, None
 
-    def _write(self, frame: Frame, read: _Read, state: RollState) -> RollState:
-        """Paint smoke to the file of a frame; the state after it."""
+    def _write(self, frame: Frame, read: _Read, left: Unfinished) -> RollState:
+        """Paint smoke to the file of a frame, unless it comes before the chunk; the state after."""
         self._velocity.look(read.smoke, read.frame.path)
-        painting = self.roll.paint(read.take(), state)
+        if frame not in self.frames:
+            return self.roll.passed(read.take(), left.state)
+        painting = self.roll.paint(read.take(), left.state)
         read.require_unchanged()
-        if frame == self.sequence[0]:
+        if frame == self.frames[0]:
             # From here on frames of an earlier painting are overwritten, and after an end at any
             # moment it is this one that can be gone on with.
-            Unfinished(self.conditions, (), self.roll.start()).save(self.unfinished_path)
+            left.save(self.unfinished_path)
         write_painted(
             self.target(frame),
             read.frame.path,
@@ -335,14 +356,15 @@ class Painter:
 
     def _require_unchanged(self, sources: Sequence[Source | None]) -> None:
         """Refuse to go on unless finished frames and what they were painted from are there."""
-        if len(sources) > len(self.sequence) or any(
+        first = self.chunk.first
+        if not self.chunk.begin <= len(sources) <= first + len(self.frames) or any(
             source and not 0 <= source.frame <= at for at, source in enumerate(sources)
         ):
             raise FileFormatError(
-                f"{self.unfinished_path}: damaged (its frames are not those of the sequence); "
+                f"{self.unfinished_path}: its frames are not those of the sequence or the chunk; "
                 "start anew without `resume`"
             )
-        for frame, source in zip(self.sequence, sources, strict=False):
+        for frame, source in zip(self.frames, sources[first:], strict=False):
             if source is None:
                 continue
             if not self.target(frame).exists():

@@ -18,6 +18,7 @@ from vnca.painting.state import RollState
 
 _METADATA = "vnca"
 _LONGEST_VALUE = 40
+_ANEW, _OTHER_STATE = "start anew without `resume`", "name another as `state_in`"
 _CELLS, _VALUES = "cells.{}", "values.{}"
 _CARRIED_CELLS, _CARRIED = "carried cells", "carried "
 
@@ -69,18 +70,27 @@ class Unfinished:
             temporary.write_bytes(save(tensors, {_METADATA: json.dumps(described)}))
 
     @classmethod
-    def load(cls, path: Path, conditions: Mapping[str, Any], roll: Roll) -> "Unfinished":
+    def load(
+        cls, path: Path, conditions: Mapping[str, Any], roll: Roll, *, handed_over: bool = False
+    ) -> "Unfinished":
         """Read it, if it can be gone on from under these conditions.
+
+        Args:
+            path: Where it is.
+            conditions: What has to be the same.
+            roll: What goes on.
+            handed_over: From one chunk to the next, rather than left by an end.
 
         Raises:
             OptionError: If another condition held when the painting was begun.
             FileFormatError: If the file is missing or damaged.
         """
         path = existing_file(path)
+        where, instead = (path, _OTHER_STATE) if handed_over else (path.parent, _ANEW)
         try:
             with safe_open(path, framework="numpy") as file:
                 described = json.loads((file.metadata() or {})[_METADATA])
-                _require_same(path.parent, described["conditions"], conditions)
+                _require_same(where, described["conditions"], conditions, instead)
                 sources = tuple(s and Source(*map(int, s)) for s in described["sources"])
                 rolls, steps = (roll, *roll.layers), described["steps_done"]
                 state, *layers = (
@@ -98,13 +108,13 @@ class Unfinished:
                 carried = _carried({n: file.get_tensor(n) for n in file.keys()})  # noqa: SIM118
                 state = replace(state, layers=tuple(layers), carried=carried)
         except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
-            raise FileFormatError(
-                f"{path}: damaged ({error}); start anew without `resume`"
-            ) from error
+            raise FileFormatError(f"{path}: damaged ({error}); {instead}") from error
         return cls(conditions, sources, state)
 
 
-def _require_same(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+def _require_same(
+    where: Path, before: Mapping[str, Any], now: Mapping[str, Any], instead: str
+) -> None:
     # As they come back from JSON, where tuples are lists.
     now = json.loads(json.dumps(now))
     for name in {**now, **before}:
@@ -112,9 +122,8 @@ def _require_same(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any
         if was != is_now:
             is_short = len(was) + len(is_now) <= _LONGEST_VALUE
             raise OptionError(
-                f"{folder}: cannot go on, since {name} is another than when the painting was begun"
-                f"{f' ({was}, now {is_now})' * is_short}; make it the same or start anew without "
-                "`resume`"
+                f"{where}: cannot go on, since {name} is another than when the painting was begun"
+                f"{f' ({was}, now {is_now})' * is_short}; make it the same or {instead}"
             )
 
 

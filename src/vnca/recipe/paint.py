@@ -6,9 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any, Literal, TypeAlias
 
 import vnca
 from vnca.core.errors import FileFormatError, OptionError, OutputError
@@ -17,15 +15,14 @@ from vnca.core.records import changed, changed_fields, distributed
 from vnca.direction import Direction
 from vnca.direction.shot import SUFFIX as SHOT
 from vnca.direction.shot import Shot
-from vnca.io import SmokeFormat, read_smoke
+from vnca.io import SmokeFormat
 from vnca.io.sequence import Frame, FrameSequence
-from vnca.io.smoke_format import NO_VELOCITY
 from vnca.painting import StylizeConfig
+from vnca.painting.chunk import Chunking
 from vnca.recipe import SILENT, Watch, painting, recorded, recorded_smoke
 from vnca.recipe.film import FilmConfig
 from vnca.recipe.rendering import CELL_OPACITY
-from vnca.recipe.sequence import open_sequence
-from vnca.rule import SMOKE_THRESHOLD, density_scale, gamma_for_cell_opacity
+from vnca.recipe.sequence import fullest_frame, open_sequence
 from vnca.rule.library import load_style, require_style
 from vnca.rule.model import MODEL_NAME, Model
 
@@ -35,10 +32,9 @@ RUN, PAINTED, FILM = "run", "painted", "film.mp4"
 ASKED_NAME = "paint.json"
 """In the folder: what was asked for, to go on with nothing else."""
 MODEL_SUFFIX = ".safetensors"
-LOOKED_AT = 12
-"""Frames, at most, of which the one with the most smoke is trained on."""
 _OF_TRAINING = ("preset", "training_frame", "memory_budget")
-_ANY_TIME = ("out", "resume", "overwrite", "device", "memory_budget", "without_film")
+_ANY_TIME = ("out", "resume", "overwrite", "device", "memory_budget", "without_film", "only")
+Part: TypeAlias = Literal["train", "paint", "film"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,16 +70,26 @@ class PaintRun:
     """Replace what an earlier call left in the folder."""
     without_film: bool = False
     """Paint only, without a film of it."""
+    only: Part | None = None
+    """Do only this part of it: train, paint, or film what is painted. A farm does each on a machine
+    of its own."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     direction: Direction = field(default_factory=Direction)
     """What is asked of the painting."""
     film: FilmConfig = field(default_factory=FilmConfig)
     """How the painting is filmed."""
+    chunking: Chunking = field(default_factory=Chunking)
+    """Which of the frames are painted, apart from the others."""
 
     def __post_init__(self) -> None:
         if self.without_film and (shaped := changed_fields(self.film, FilmConfig())):
             raise OptionError(f"`film.{shaped[0]}`, `without_film`: one of them, not both")
+        part = changed_fields(self.chunking, Chunking())
+        if part and self.only != "paint":
+            raise OptionError(f"`{part[0]}`: needs `only` paint, as a chunk is no whole film")
+        if self.only == "film" and self.without_film:
+            raise OptionError("`only` film, `without_film`: one of them, not both")
         if self.style is not None:
             require_style(self.style)
         if self.resume and self.overwrite:
@@ -91,6 +97,8 @@ class PaintRun:
         idle = [n for n in _OF_TRAINING if getattr(self, n) != getattr(PaintRun, n)]
         if idle and self.is_trained:
             raise OptionError(f"`{idle[0]}`: {self.name} is a model, which is trained already")
+        if self.only == "train" and self.is_trained:
+            raise OptionError(f"`only` train: {self.name} is a model, which is trained already")
 
     def require_one_style(self) -> None:
         """Refuse two pictures to paint by, and none.
@@ -131,7 +139,9 @@ def paint(
     resume: bool = False,
     overwrite: bool = False,
     without_film: bool = False,
+    only: Part | None = None,
     film: FilmConfig | Mapping[str, Any] | None = None,
+    chunking: Chunking | Mapping[str, Any] | None = None,
     watch: Watch = SILENT,
     **options: Any,
 ) -> list[Path]:
@@ -153,7 +163,9 @@ def paint(
         resume: Go on where an earlier call was interrupted, or else begin.
         overwrite: Replace what an earlier call left in the folder.
         without_film: Paint only.
+        only: Do this part of it: `train`, `paint`, or `film` what is painted.
         film: How it is filmed: a `FilmConfig`, or some of its fields.
+        chunking: Which of the frames are painted: a `Chunking`, or some of its fields.
         watch: Is told how far it has come, and may cancel.
         **options: Fields of `Direction` (`strength="@mask"`); and of `SmokeFormat`
             (`velocity_units="mantaflow"`), in the place of those that were recorded where `picture`
@@ -188,6 +200,8 @@ def paint(
         overwrite=overwrite,
         without_film=without_film,
         film=changed("film", FilmConfig(), film),
+        only=only,
+        chunking=changed("chunking", Chunking(), chunking),
     )
     if shot is not None:
         asked = over_shot(asked, shot.applied(PaintRun(sequence="", out=Path())))
@@ -231,25 +245,29 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
     options.require_one_style()
     sequence = open_sequence(options.sequence, options.frames, watch)
     goes_on = _begin(options)
-    model, smoke, scales = options.picture or Path(options.name), options.smoke, _Scales()
+    model, smoke, scales = options.picture or Path(options.name), options.smoke, painting.Scales()
     style = None
     if options.style is not None:
         style = load_style(options.style)
-        scales = _fitted(options, sequence)
+        frame = _training_frame(options, sequence).path
+        scales = painting.Scales.fitted(frame, smoke, CELL_OPACITY["painted"])
     elif not options.is_trained:
         try:
             model = _trained(options, sequence, watch, goes_on=goes_on)
+            if options.only == "train":
+                return
         except KeyboardInterrupt:
             watch.note(f"to go on with all of it: the same vnca {COMMAND} with `resume`")
             raise
         # With the velocity's scale as it was fitted for the training.
         smoke = recorded_smoke(model, Model.load(model)) or smoke
+    is_filmed = not options.without_film and options.only != "paint"
     asked = painting.StylizeRun(
         model=model,
         sequence=options.sequence,
         out=options.out / PAINTED,
         frames=options.frames,
-        preview=None if options.without_film else options.out / FILM,
+        preview=options.out / FILM if is_filmed else None,
         refine=options.refine,
         resume=goes_on,
         overwrite=options.overwrite,
@@ -258,8 +276,12 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
         device=options.device,
         smoke=smoke,
         config=StylizeConfig(**_fields(options.direction), seed=options.seed),
-        film=options.film,
+        film=options.film if is_filmed else FilmConfig(),
+        chunking=options.chunking,
     )
+    if options.only == "film":
+        painting.film_painted(asked, watch, style)
+        return
     with closing(painting.run(asked, watch, style)) as paths:  # type: ignore[type-var]
         yield from paths
 
@@ -280,7 +302,7 @@ def _begin(options: PaintRun) -> bool:
     now = json.loads(json.dumps(_asked(options)))
     has_begun = any((options.out / name).exists() for name in (RUN, PAINTED))
     if path.exists() and has_begun and not options.overwrite:
-        if not options.resume:
+        if not options.resume and options.only is None:
             raise OutputError(
                 f"{options.out}: holds a painting already; go on with `resume`, or choose another "
                 "`out` or `overwrite`"
@@ -295,7 +317,7 @@ def _begin(options: PaintRun) -> bool:
                 f"{options.out}: cannot go on, since `{others[0]}` is another than when it was "
                 "begun; make it the same, or begin anew with `overwrite`"
             )
-        return True
+        return options.resume
     options.out.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as temporary:
         temporary.write_text(json.dumps(now, indent=2) + "\n", encoding="utf-8")
@@ -304,7 +326,9 @@ def _begin(options: PaintRun) -> bool:
 
 def _asked(options: PaintRun) -> dict[str, Any]:
     """What has to be the same to go on, as JSON values."""
-    asked = {k: v for k, v in recorded(options).items() if k not in (*_ANY_TIME, "film")}
+    asked = recorded(options)
+    for name in (*_ANY_TIME, "film", "chunking"):
+        asked.pop(name)
     path = options.picture and str(options.picture.absolute())
     asked |= asked.pop("direction")  # one by one, to be named if one is another
     asked |= {"picture": path, "vnca": vnca.__version__}
@@ -326,7 +350,10 @@ def _trained(options: PaintRun, sequence: FrameSequence, watch: Watch, *, goes_o
     from vnca.training.presets import preset
 
     folder = options.out / RUN
-    if goes_on and (folder / CHECKPOINT_NAME).exists():
+    if options.only in ("paint", "film"):
+        if not (folder / MODEL_NAME).exists():
+            raise OptionError(f"{folder}: no model to {options.only} with yet; `only` train first")
+    elif goes_on and (folder / CHECKPOINT_NAME).exists():
         again = smoke.ResumeSmokeRun(resume=folder, memory_budget=options.memory_budget)
         smoke.resume_run(again, watch)
     elif not (goes_on and (folder / MODEL_NAME).exists()):
@@ -348,24 +375,6 @@ def _trained(options: PaintRun, sequence: FrameSequence, watch: Watch, *, goes_o
     return folder
 
 
-class _Scales(NamedTuple):
-    """What smoke is painted with, where it is not as the rule was trained."""
-
-    density: float | None = None
-    gamma: float | None = None
-
-
-def _fitted(options: PaintRun, sequence: FrameSequence) -> _Scales:
-    """The density that counts as 1, and γ, for smoke that a style of the library never saw.
-
-    As training on the frame with the most smoke would choose them.
-    """
-    seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
-    density = read_smoke(_training_frame(options, sequence).path, seen).density_field.values
-    scale = density_scale(density)
-    return _Scales(scale, gamma_for_cell_opacity(density / scale, CELL_OPACITY["painted"]))
-
-
 def _training_frame(options: PaintRun, sequence: FrameSequence) -> Frame:
     """The frame that is trained on: the one asked for, or of some the one with the most smoke.
 
@@ -381,12 +390,4 @@ def _training_frame(options: PaintRun, sequence: FrameSequence) -> Frame:
             f"`training_frame` {options.training_frame}: is not among the frames of "
             f"{options.sequence}"
         )
-    seen = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY)
-    last = len(sequence) - 1
-    picked = sorted({round(at) for at in np.linspace(0, last, min(LOOKED_AT, len(sequence)))})
-
-    def cells(at: int) -> int:
-        density = read_smoke(sequence[at].path, seen).density_field.values
-        return int(np.count_nonzero(density > SMOKE_THRESHOLD * density_scale(density)))
-
-    return sequence[max(picked, key=cells)]
+    return fullest_frame(sequence, options.smoke)

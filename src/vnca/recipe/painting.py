@@ -7,9 +7,10 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
+from typing import NamedTuple
 
 import vnca
-from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.errors import BackendUnavailableError, OptionError, SequenceError
 from vnca.core.files import remove_leftovers, writable_file, writable_folder
 from vnca.core.records import changed_fields
 from vnca.core.volume import refined_transform
@@ -20,8 +21,9 @@ from vnca.io.painted import read_colour
 from vnca.io.provenance import read_provenance
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.painting import Roll, StylizeConfig
+from vnca.painting.chunk import Chunk, Chunking
 from vnca.painting.painter import OnError, Painter
-from vnca.recipe import Watch, recorded
+from vnca.recipe import Watch, recorded, tracked
 from vnca.recipe.directing import digest, directed, say_styles
 from vnca.recipe.film import Film, FilmConfig, Shown
 from vnca.recipe.sequence import (
@@ -31,6 +33,7 @@ from vnca.recipe.sequence import (
     require_dense_enough,
     sequence_region,
 )
+from vnca.rule import density_scale, gamma_for_cell_opacity
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.rule.paint import require_refinement
 
@@ -78,6 +81,8 @@ class StylizeRun:
     """How the rule is applied."""
     film: FilmConfig = field(default_factory=FilmConfig)
     """How the preview is filmed."""
+    chunking: Chunking = field(default_factory=Chunking)
+    """Which of the frames are painted, apart from the others."""
 
     def __post_init__(self) -> None:
         Compute(self.backend, precision=self.precision)
@@ -100,6 +105,24 @@ class StylizeRun:
             )
 
 
+class Scales(NamedTuple):
+    """What smoke is painted with, where it is not as the rule was trained."""
+
+    density: float | None = None
+    gamma: float | None = None
+
+    @classmethod
+    def fitted(cls, frame: Path, smoke: SmokeFormat, opacity: float) -> "Scales":
+        """For smoke that a rule never saw: as training on one of its frames would choose them.
+
+        `opacity` is that of a cell of typical smoke.
+        """
+        seen = dataclasses.replace(smoke, velocity_grid=NO_VELOCITY)
+        density = read_smoke(frame, seen).density_field.values
+        scale = density_scale(density)
+        return cls(scale, gamma_for_cell_opacity(density / scale, opacity))
+
+
 _TOLD = ("strength", "density_strength", "steps_per_frame", "domain")
 """What painted files tell one by one."""
 
@@ -119,10 +142,43 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
+    return _paint(_painter(options, watch, model), options, watch)
+
+
+def film_painted(options: StylizeRun, watch: Watch, model: Model | None = None) -> None:
+    """Make the film of a painting whose frames are all there, the same as its preview.
+
+    Args:
+        options: What was painted, and how.
+        watch: Is told how far it has come.
+        model: The model of the options, if it is loaded already.
+
+    Raises:
+        SequenceError: If a frame is not there yet.
+        VncaError: If an input cannot be used, or the film cannot be written.
+    """
+    painter = _painter(options, watch, model)
+    for target in map(painter.target, painter.frames):
+        if not target.exists() or read_provenance(target) is None:
+            raise SequenceError(f"{target}: is not painted yet; a film shows all of its frames")
+    with ExitStack() as stack:
+        film = _film(options, painter, stack, watch)
+        if film is None or options.preview is None:
+            return
+        for frame in tracked(painter.frames, watch, "filming", len(painter.frames), "frames"):
+            film.add(read_painted(painter.target(frame), frame.path, options))
+    watch.made("film", options.preview)
+
+
+def _painter(options: StylizeRun, watch: Watch, model: Model | None) -> Painter:
+    """What paints as asked, after a look at all that it takes."""
     model = model or Model.load(options.model)
     rule = model.rule.rescaled(density=options.density_scale, gamma=options.gamma)
     sequence = open_sequence(options.sequence, options.frames, watch)
+    chunk = Chunk.of(sequence, options.chunking)
     writable_folder(options.out)
+    if chunk.state_out is not None:
+        writable_file(chunk.state_out)
     if options.preview:
         writable_file(options.preview)
         remove_leftovers(options.preview.parent, [options.preview.name])
@@ -140,7 +196,7 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
     say_styles(model, options.config, watch)
     roll = ready.roll
     facts = _facts(options, model, roll)
-    painter = Painter(
+    return Painter(
         sequence,
         options.out,
         roll,
@@ -170,26 +226,27 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
             "`steps_per_frame`": roll.steps_per_frame,
             "`domain`": roll.domain_kind,
             **ready.conditions,
+            **chunk.conditions(sequence),
         },
         tell=watch.note,
         refine=options.refine,
         facts=facts,
+        chunk=chunk,
     )
-    return _paint(painter, options, watch)
 
 
 def _paint(painter: Painter, options: StylizeRun, watch: Watch) -> Iterator[Path | None]:
     """The files of the frames, painted to the end, or until `watch` or the caller ends it."""
-    total, finished = len(painter.sequence), 0
+    total, finished, first = len(painter.frames), 0, painter.chunk.first
     with ExitStack() as stack:
         film = _film(options, painter, stack, watch)
         unfinished = painter.begin(resume=options.resume, overwrite=options.overwrite)
-        already = len(unfinished.sources)
+        already = max(0, len(unfinished.sources) - first)
         try:
             with closing(painter.paint(unfinished)) as paths:
                 watch.progress("painting", already, total, "frames")
                 for finished, (frame, path) in enumerate(
-                    zip(painter.sequence, paths, strict=True), 1
+                    zip(painter.frames, paths, strict=True), 1
                 ):
                     if film is not None and path is not None:
                         film.add(read_painted(path, frame.path, options))
@@ -201,6 +258,8 @@ def _paint(painter: Painter, options: StylizeRun, watch: Watch) -> Iterator[Path
             watch.note(f"stopped after {done} of {total} frames; `resume` goes on")
             raise
     painter.discard()
+    if painter.chunk.state_out is not None:
+        watch.made("state", painter.chunk.state_out)
     watch.made("painted", options.out)
     if film is not None and options.preview is not None:
         watch.made("film", options.preview)
@@ -215,7 +274,7 @@ def _film(options: StylizeRun, painter: Painter, stack: ExitStack, watch: Watch)
     try:
         device = painter.roll.compute.device
         film = Film(
-            options.preview, options.film, bounds, frames=len(painter.sequence), device=device
+            options.preview, options.film, bounds, frames=len(painter.frames), device=device
         )
         return stack.enter_context(film)
     except BackendUnavailableError as error:

@@ -16,12 +16,15 @@ from vnca.core.files import existing_file
 from vnca.core.lattice import Lattice, Placement, Region
 from vnca.core.volume import Volume
 from vnca.io import SmokeFormat, read_smoke, smoke_extent, with_fitted_scale
-from vnca.io.sequence import FrameSequence, find_frames, format_frames, frames_beside
+from vnca.io.sequence import Frame, FrameSequence, find_frames, format_frames, frames_beside
 from vnca.io.smoke_format import NO_VELOCITY, Extent, on_lattice, on_one_lattice
 from vnca.painting.frames import VelocityCheck, read_ahead, require_dense
 from vnca.painting.painter import BROKEN
 from vnca.recipe import Watch
-from vnca.rule import Rule
+from vnca.rule import SMOKE_THRESHOLD, Rule, density_scale
+
+LOOKED_AT = 12
+"""Frames, at most, of which the one with the most smoke is chosen."""
 
 
 def open_sequence(pattern: str | Path, frames: str | None, watch: Watch) -> FrameSequence:
@@ -118,6 +121,22 @@ def sequence_region(
     if resampled:
         watch.note(_resampled(*resampled[0], lattice, others=len(resampled) - 1))
     return Region(lattice, box)
+
+
+def fullest_frame(sequence: FrameSequence, smoke: SmokeFormat) -> Frame:
+    """Of some frames, evenly spaced, the one with the most smoke.
+
+    Raises:
+        FileFormatError: If a frame cannot be read.
+    """
+    seen, last = replace(smoke, velocity_grid=NO_VELOCITY), len(sequence) - 1
+    picked = sorted({round(at) for at in np.linspace(0, last, min(LOOKED_AT, len(sequence)))})
+
+    def cells(at: int) -> int:
+        density = read_smoke(sequence[at].path, seen).density_field.values
+        return int(np.count_nonzero(density > SMOKE_THRESHOLD * density_scale(density)))
+
+    return sequence[max(picked, key=cells)]
 
 
 def require_dense_enough(sequence: FrameSequence, smoke: SmokeFormat, scale: float) -> None:

@@ -16,6 +16,7 @@ from vnca.engine import compute_of
 from vnca.io import with_fitted_scale
 from vnca.io.sequence import find_frames
 from vnca.painting import Painting, Roll, painted
+from vnca.painting.chunk import Chunk, Chunking
 from vnca.painting.frames import VelocityCheck, require_dense
 from vnca.painting.painter import OnError
 from vnca.recipe import SILENT, Watch, applied, tracked
@@ -85,6 +86,7 @@ def stylize(
     overwrite: bool = False,
     on_error: OnError = "stop",
     film: FilmConfig | Mapping[str, Any] | None = None,
+    chunking: Chunking | Mapping[str, Any] | None = None,
     watch: Watch = SILENT,
     **options: Any,
 ) -> Iterator[PaintedFrame]:
@@ -111,6 +113,8 @@ def stylize(
             another painting.
         on_error: With a file that cannot be read: `stop`, `skip` it, or `hold` the frame before.
         film: How the preview is filmed: a `FilmConfig`, or some of its fields.
+        chunking: Which of the frames are painted, apart from the others: a `Chunking`, or some of
+            its fields, as `{"chunk": "9-16"}`.
         watch: Is told how far it has come, and may cancel.
         **options: Fields of `SmokeFormat`, in the place of those that the training recorded, and of
             `StylizeConfig`.
@@ -141,13 +145,14 @@ def stylize(
         smoke=smoke,
         config=config,
         film=changed("film", FilmConfig(), film),
+        chunking=changed("chunking", Chunking(), chunking),
     )
     if out is not None:
         if not isinstance(sequence, (str, Path)):
             raise OptionError("`out`: volumes have no files to be painted beside; leave it out")
         return _from_files(asked, run(asked, watch, model))
-    for option in ("preview", "resume", "overwrite"):
-        if getattr(asked, option):
+    for option in ("preview", "resume", "overwrite", "chunking"):
+        if getattr(asked, option) not in (None, False, Chunking()):
             raise OptionError(f"`{option}`: needs a folder for the painting as `out`")
     if isinstance(sequence, (str, Path)):
         return _in_memory(asked, model, None, watch)
@@ -159,6 +164,8 @@ def stylize(
 def _from_files(options: StylizeRun, paths: Iterator[Path | None]) -> Iterator[PaintedFrame]:
     with closing(paths):  # type: ignore[type-var]
         sources = find_frames(options.sequence, options.frames)
+        chunk = Chunk.of(sources, options.chunking)
+        sources = sources[chunk.first : chunk.stop]
         for source, path in zip(sources, paths, strict=True):
             if path is not None:
                 load = partial(read_painted, path, source.path, options)

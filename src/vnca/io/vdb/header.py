@@ -3,7 +3,7 @@
 Reference: OpenVDB `io/GridDescriptor.cc`, `io/Archive.cc` (`readGrid`), `io/File.cc`.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO
@@ -19,9 +19,10 @@ from vnca.io.vdb.layout import (
     WRITTEN_VERSION,
     Compression,
     Cursor,
+    ValueType,
 )
 from vnca.io.vdb.metadata import Metadata, Transform, read_metadata, read_transform
-from vnca.io.vdb.tree import locate_leaves, read_tree
+from vnca.io.vdb.tree import Tree, locate_leaves, read_active, read_tree
 
 _TREE_NAME = "Tree_{}_" + "_".join(map(str, TREE))
 
@@ -195,6 +196,22 @@ class GridHeader:
             FileFormatError: If it is truncated, corrupt or of an unsupported kind.
             GridError: If the file has been closed or the transform is not linear.
         """
+        tree, value_type, cursor = self._tree(read_tree)
+        if cursor.remaining:
+            raise cursor.error(f"corrupt: {cursor.remaining} bytes follow the last leaf")
+        name = decoded(self.grid_name)
+        return Grid(name, value_type.name, self.transform, tree, self.metadata, self.is_half)
+
+    def read_active(self) -> Grid:
+        """Which cells are active, as a grid of booleans; quick, as no values are read.
+
+        The errors are those of `read`.
+        """
+        tree, _, _ = self._tree(read_active)
+        return Grid(decoded(self.grid_name), "bool", self.transform, tree, self.metadata)
+
+    def _tree(self, read: Callable[..., Tree]) -> tuple[Tree, ValueType, Cursor]:
+        """What a function of `vdb/tree.py` reads, of which type, and the cursor behind it."""
         owner = self.parent or self
         end = self.source.size if owner.end is None else owner.end
         cursor = self.source.cursor(owner.tree_start or 0, end, self.name)
@@ -202,16 +219,13 @@ class GridHeader:
             raise cursor.error(
                 f"cannot read values of type {self.value_type}, only {', '.join(VALUE_TYPES)}"
             )
-        transform = self.transform
+        _ = self.transform  # or an error says why there is none
         if owner.tree_start is None:
             raise cursor.error(f"its tree lies behind a {owner.map_type} of unknown length")
         if owner.compression > _ALL_FLAGS:
             raise cursor.error(f"unknown compression {int(owner.compression)}")
-        tree = read_tree(cursor, value_type, is_half=self.is_half, flags=owner.compression)
-        if cursor.remaining:
-            raise cursor.error(f"corrupt: {cursor.remaining} bytes follow the last leaf")
-        name = decoded(self.grid_name)
-        return Grid(name, value_type.name, transform, tree, self.metadata, self.is_half)
+        tree = read(cursor, value_type, is_half=self.is_half, flags=owner.compression)
+        return tree, value_type, cursor
 
 
 _ALL_FLAGS = Compression.ZIP | Compression.ACTIVE_MASK | Compression.BLOSC

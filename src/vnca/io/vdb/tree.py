@@ -156,6 +156,19 @@ def read_tree(cursor: Cursor, value_type: ValueType, *, is_half: bool, flags: Co
     )
 
 
+def read_active(
+    cursor: Cursor, value_type: ValueType, *, is_half: bool, flags: Compression
+) -> Tree:
+    """Which cells are active, as the values of a tree, from its nodes alone.
+
+    The arguments and errors are those of `read_tree`; values of leaves are not read.
+    """
+    topology = _read_topology(cursor, value_type, is_half, flags)
+    origins, active = topology.leaves()
+    tiles = Tiles(*(np.concatenate(parts) for parts in zip(*topology.tiles, strict=True)))
+    return Tree(np.zeros((), bool), origins, active, active, tiles._replace(values=tiles.active))
+
+
 def locate_leaves(
     cursor: Cursor, value_type: ValueType, *, is_half: bool, flags: Compression
 ) -> int:

@@ -40,8 +40,8 @@ COMMANDS = {
     "paint": "time frames of the paper's size, from file to file",
 }
 _HOMES = {
-    "step": "bench_torch:run_step",
-    "train": "bench_torch:run_train",
+    "step": "bench.training:run_step",
+    "train": "bench.training:run_train",
     "stylize": "bench:run_stylize",
     "paint": "bench:run_paint",
 }

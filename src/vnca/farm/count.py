@@ -1,0 +1,154 @@
+"""How many cells a painting has, from the nodes of the files' trees, without their values."""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from vnca.core import AnyArray, IntArray
+from vnca.core.bricks import EDGE
+from vnca.core.field import Field, dilated
+from vnca.core.lattice import Region
+from vnca.engine.domain import DomainKind
+from vnca.io import SmokeFormat, read_smoke
+from vnca.io.sequence import Frame, FrameSequence
+from vnca.io.smoke_format import NO_VELOCITY
+from vnca.io.vdb import open_vdb
+from vnca.io.vdb_smoke import density_header
+
+
+class Count(NamedTuple):
+    """The cells of a frame, on the grid of the smoke.
+
+    Attributes:
+        frame: Its number.
+        smoke: Active cells of the density's grid: what is painted, at least.
+        cells: Cells of the automaton, at most: it leaves out smoke that is too thin.
+        copied: Bytes of the file's other grids, which a painted file has, too.
+    """
+
+    frame: int
+    smoke: int
+    cells: int
+    copied: int
+
+
+def counted(
+    sequence: FrameSequence, smoke: SmokeFormat, region: Region, dilation: int, kind: DomainKind
+) -> Iterator[Count]:
+    """The cells of each frame.
+
+    Args:
+        sequence: The frames.
+        smoke: How they are read.
+        region: The lattice of the sequence, and the box of its smoke.
+        dilation: How many cells around smoke are active.
+        kind: Which cells are: those near smoke, or all of the box.
+
+    Raises:
+        FileFormatError: If a frame cannot be read.
+        GridError: If it has no density.
+    """
+    cell = abs(np.linalg.det(region.lattice.to_world[:3, :3]))
+    whole = math.prod(region.box.grown(dilation).shape)
+    for frame in sequence:
+        active, volume, copied = active_cells(frame, smoke)
+        share = volume / cell  # cells of the lattice in one of the file
+        alive = around(active, dilation)
+        count = whole if kind == "box" else round(int(alive.values.sum()) * share)
+        yield Count(frame.number, round(int(active.values.sum()) * share), count, copied)
+
+
+def active_cells(frame: Frame, smoke: SmokeFormat) -> tuple[Field, float, int]:
+    """Which cells of a file are active, the volume of each in the world, and bytes that are copied.
+
+    Formats that do not tell apart from their values are read whole.
+
+    Raises:
+        FileFormatError: If it cannot be read.
+        GridError: If it has no density.
+    """
+    if frame.path.suffix.lower() != ".vdb":
+        volume = read_smoke(frame.path, replace(smoke, velocity_grid=NO_VELOCITY))
+        density, matrix = volume.density_field, volume.index_to_world
+        active = replace(density, values=density.values > 0, outside=False).trimmed()
+        return active, abs(float(np.linalg.det(matrix[:3, :3]))), 0
+    with open_vdb(frame.path) as file:
+        header = density_header(file, smoke)
+        grid = header.read_active()
+        active, _ = grid.fields(grid.active_box())
+        others = (g for g in file.grids.values() if g.name != header.name and g.parent is None)
+        copied = sum(other.stored_bytes for other in others)
+        matrix = header.transform.index_to_world
+    return active.trimmed(), abs(float(np.linalg.det(matrix[:3, :3]))), copied
+
+
+def around(active: Field, dilation: int) -> Field:
+    """Cells at most `dilation` cells along each axis from one that is active."""
+    return dilated(replace(active, box=active.box.grown(dilation)), dilation)
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """What tiles of a frame with ghost zones tell each other.
+
+    Attributes:
+        tiles: Tiles with cells.
+        messages: From a tile to one beside it, each time ghost zones are filled.
+        ghosts: Cells that are sent each time.
+        largest: Cells of the largest tile, with its ghost zone.
+        cells: Cells of all tiles, without.
+    """
+
+    tiles: int
+    messages: int
+    ghosts: int
+    largest: int
+    cells: int
+
+
+def exchanged(alive: Field, tile: int, halo: int) -> Exchange:
+    """What tiles of so many cells along an edge exchange; cells of a brick are taken as spread.
+
+    Args:
+        alive: Cells of the automaton.
+        tile: Cells along the edge of a tile, a multiple of 8.
+        halo: Cells of a ghost zone, at most those of a tile: as many steps are done between two
+            exchanges.
+    """
+    counts = alive.values.reshape(len(alive.values), -1).sum(axis=1)
+    lowest = alive.bricks.astype(np.int64) * EDGE
+    own = lowest // tile
+    tiles, row = np.unique(own, axis=0, return_inverse=True)
+    known = {tuple(at): number for number, at in enumerate(tiles.tolist())}
+    inside = np.bincount(row.reshape(-1), counts, len(tiles))
+    ghosts, pairs = np.zeros(len(tiles)), set()
+    for step in _ways():
+        reached = own + step
+        share = _shared(lowest, reached * tile, tile, halo)
+        for brick in np.flatnonzero((share > 0) & (counts > 0)):
+            to = known.get(tuple(reached[brick].tolist()))
+            if to is not None:
+                ghosts[to] += counts[brick] * share[brick]
+                pairs.add((int(row.reshape(-1)[brick]), to))
+    return Exchange(
+        len(tiles),
+        len(pairs),
+        round(ghosts.sum()),
+        round((inside + ghosts).max()),
+        int(counts.sum()),
+    )
+
+
+def _ways() -> Iterable[IntArray]:
+    return (np.array(way) for way in product((-1, 0, 1), repeat=3) if any(way))
+
+
+def _shared(lowest: AnyArray, tiles: AnyArray, tile: int, halo: int) -> AnyArray:
+    """Which part of bricks lies in the ghost zones of tiles, each by its lowest cell, `[m]`."""
+    low = np.maximum(lowest, tiles - halo)
+    high = np.minimum(lowest + EDGE, tiles + tile + halo)
+    return np.maximum(high - low, 0).prod(axis=1) / EDGE**3
