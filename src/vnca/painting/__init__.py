@@ -7,17 +7,17 @@ of a sequence.
 Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from vnca.core import AnyArray, Box, FloatArray, IntArray
+from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
-from vnca.direction import Carried, Direction, Inputs, Moment
+from vnca.direction import NUMBERS, Carried, Direction, Inputs, Moment
 from vnca.direction.carried import carry
 from vnca.direction.colour import Editing
 from vnca.direction.mixing import Answer, Parts, layered
@@ -26,6 +26,7 @@ from vnca.engine import Compute, Session, open_session
 from vnca.engine.domain import Domain, DomainKind
 from vnca.io.smoke_format import on_one_lattice
 from vnca.painting.shown import COLOUR_DILATION, Painting, composed
+from vnca.painting.state import Ready, RollState
 from vnca.painting.transport import transported
 from vnca.rule import SMOKE_THRESHOLD, Rule
 from vnca.rule.conditioning import priors
@@ -55,55 +56,6 @@ class StylizeConfig(Direction):
         super().__post_init__()
         if self.warmup < 0:
             raise OptionError("`warmup` must not be negative")
-
-
-@dataclass(frozen=True, eq=False)
-class RollState:
-    """What a frame leaves to the next: all it takes to go on from there.
-
-    Attributes:
-        cells: `[n, 3]` index coordinates, in the lattice, of the cells alive; none before the
-            first frame and after one without smoke.
-        values: `[n + 1, C]`, their state and a last row of zeros.
-        steps_done: Steps since the sequence began, by which the next ones are numbered.
-        frame: Number of that frame, if there was one.
-        carried: What goes along with the smoke beside it, where anything does.
-        layers: What the rules of further layers left, of each its own.
-    """
-
-    cells: IntArray
-    values: FloatArray
-    steps_done: int = 0
-    frame: int | None = None
-    carried: Carried | None = None
-    layers: tuple["RollState", ...] = ()
-
-    @classmethod
-    def empty(cls, channels: int, steps_done: int = 0) -> "RollState":
-        """That of nothing painted yet."""
-        cells = np.zeros((0, 3), dtype=np.int32)
-        return cls(cells, np.zeros((1, channels), dtype=np.float32), steps_done)
-
-
-class Ready(NamedTuple):
-    """A frame, with all that painting it takes beside what the frame before it left.
-
-    Attributes:
-        smoke: On a grid as fine as the automaton's.
-        domain: Its active cells.
-        session: The automaton on them; None if there are none.
-        layers: What further layers take, of each its own.
-    """
-
-    smoke: Volume
-    domain: Domain
-    session: Session | None
-    layers: tuple["Ready", ...] = ()
-
-    @property
-    def frame(self) -> int:
-        """Its number in the sequence."""
-        return self.smoke.frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +139,7 @@ class Roll:
         Raises:
             GridError: If the smoke lacks what the rule is conditioned on.
         """
-        domain = self._domain(smoke)
+        domain = self.domain(smoke)
         layers = tuple(layer.ready(smoke) for layer in self.layers)
         if len(domain) == 0:
             return Ready(smoke, domain, None, layers)
@@ -207,29 +159,51 @@ class Roll:
             state: What the frame before it left.
         """
         ready = smoke if isinstance(smoke, Ready) else self.ready(smoke)
-        moment = self._moment(ready.smoke, state.carried)
+        moment = self.moment(ready.smoke, state.carried)
         state, parts = self._stepped(ready, state, moment)
         del ready, smoke  # what follows makes arrays of the same order
-        return self._painting(moment, parts, replace(state, carried=moment.carried))
+        return self.painting(moment, parts, replace(state, carried=moment.carried))
 
-    def _moment(self, smoke: Volume, carried: Carried | None) -> Moment:
+    def moment(self, smoke: Volume, carried: Carried | None) -> Moment:
         """A frame as the direction is asked about it, and what smoke carried to it."""
-        threshold = SMOKE_THRESHOLD * self.rule.scales.density
-        moment = Moment(smoke, self.box, threshold, self.grid, self.inputs)
+        moment = self.moment_of(smoke)
         return replace(moment, carried=carry(carried, self.config.parts(), moment))
+
+    def moment_of(self, smoke: Volume) -> Moment:
+        """The same with nothing carried."""
+        threshold = SMOKE_THRESHOLD * self.rule.scales.density
+        return Moment(smoke, self.box, threshold, self.grid, self.inputs)
 
     def _stepped(self, ready: Ready, state: RollState, moment: Moment) -> tuple[RollState, Parts]:
         """The state after the steps of a frame, and what is painted, layers over each other."""
-        before = state.layers
-        state = self._advanced(ready, state, moment)
-        parts = self._parts(ready.domain, state, moment)
-        layers = []
-        for number, layer in enumerate(self.layers):
-            left, above = layer._stepped(ready.layers[number], before[number], moment)
-            layers.append(left)
+        left = [
+            roll._advanced(each, before, moment)
+            for roll, each, before in zip(
+                (self, *self.layers),
+                (ready, *ready.layers),
+                (state, *state.layers),
+                strict=True,
+            )
+        ]
+        parts = self.seen((ready.domain, *(each.domain for each in ready.layers)), left, moment)
+        return replace(left[0], layers=tuple(left[1:])), parts
+
+    def seen(self, domains: Sequence[Domain], states: Sequence[RollState], moment: Moment) -> Parts:
+        """What is painted, layers over each other.
+
+        Args:
+            domains: The cells of this rule, and of those of its layers.
+            states: Their states.
+            moment: The frame.
+        """
+        parts, *above = (
+            roll._parts(domain, state, moment)
+            for roll, domain, state in zip((self, *self.layers), domains, states, strict=True)
+        )
+        for number, layer in enumerate(above):
             share = self.config.share(number, moment, self._places(parts.at))
-            parts = layered(parts, above, share)
-        return replace(state, layers=tuple(layers)), parts
+            parts = layered(parts, layer, share)
+        return parts
 
     def _advanced(self, ready: Ready, state: RollState, moment: Moment) -> RollState:
         """The state of this rule alone after the steps of a frame."""
@@ -238,31 +212,31 @@ class Roll:
             return RollState.empty(self.rule.config.channels, state.steps_done)
         warmup = self.config.warmup if len(state.cells) == 0 else 0
         done = state.steps_done + warmup
-        steps = self._steps(moment, domain)
+        steps = self.steps(moment, domain)
         fewest, most = int(np.min(steps)), int(np.max(steps))
         # What they begin with has no name here, or it would be kept to the last step.
         values = session.run(
-            session.upload(self._begun(ready, state, moment)),
+            session.upload(self.begun(ready, state, moment)),
             range(state.steps_done, done + fewest),
         )
         for step in range(fewest, most):
-            values = _with_rest(session, values, done + step, rest=np.asarray(steps) <= step)
+            values = with_rest(session, values, done + step, rest=np.asarray(steps) <= step)
         return RollState(domain.cells, session.read(values), done + most, ready.smoke.frame)
 
-    def _steps(self, moment: Moment, domain: Domain) -> AnyArray | int:
+    def steps(self, moment: Moment, domain: Domain) -> AnyArray | int:
         """How many steps the cells do, all as many or each its own, `[n]`."""
         if self.config.steps_per_frame is None:
             return self.rule.config.steps_per_frame
         asked: Answer = self.config.value("steps_per_frame", moment, domain.cells)
         return np.rint(asked).astype(int) * self.grid
 
-    def _begun(self, ready: Ready, state: RollState, moment: Moment) -> FloatArray:
+    def begun(self, ready: Ready, state: RollState, moment: Moment) -> FloatArray:
         """What the cells of a frame begin with, of the state that the one before it left."""
         smoke, domain = ready.smoke, ready.domain
         if len(state.cells) == 0:
             return domain.seed(self.rule.config.channels)
         before, velocity = Domain(state.cells, domain.box), smoke.velocity_field
-        speed = self._pattern_speed(moment, domain)
+        speed = self.pattern_speed(moment, domain)
         if velocity is None or not np.any(speed):
             return before.carry(state.values, domain)
         frames = 1 if state.frame is None else max(1, smoke.frame - state.frame)
@@ -270,7 +244,15 @@ class Roll:
             state.values, before, domain, velocity, speed * frames, threads=self.compute.threads
         )
 
-    def _pattern_speed(self, moment: Moment, domain: Domain) -> Answer:
+    @property
+    def fastest(self) -> float:
+        """How many times as fast as the velocity the pattern is carried, at most."""
+        if self.config.pattern_speed is None:
+            return float(self.rule.config.transport)
+        asked = self.config.values["pattern_speed"]
+        return abs(asked.number) if isinstance(asked, Constant) else NUMBERS["pattern_speed"].high
+
+    def pattern_speed(self, moment: Moment, domain: Domain) -> Answer:
         """How fast the velocity carries the pattern, everywhere or in each cell, `[n]`."""
         if self.config.pattern_speed is None:
             return float(self.rule.config.transport)
@@ -285,14 +267,23 @@ class Roll:
             return at
         return (at + 0.5) / self.finer - 0.5
 
-    def _painting(self, moment: Moment, parts: Parts, state: RollState) -> Painting:
-        """The frame as a state shows it, on the grid of the painting."""
+    def painting(
+        self, moment: Moment, parts: Parts, state: Any, mass: tuple[float, float] | None = None
+    ) -> Painting:
+        """The frame as a state shows it, on the grid of the painting.
+
+        Args:
+            moment: The frame.
+            parts: What is painted.
+            state: What is left to the next.
+            mass: As of `composed`.
+        """
         smoke = moment.smoke.refined(self.finer)
         if self.config.fluff and not smoke.box.is_empty:
             smoke = smoke.within(smoke.box.grown(self.beyond))
         reach = self.colour_dilation * self.finer
         density, colour, light = composed(
-            smoke, parts, self.config, moment, self._places, editing=self.editing, reach=reach
+            smoke, parts, self.config, moment, self._places, self.editing, reach=reach, mass=mass
         )
         return Painting.of_fields(smoke, density, colour, state, moment.smoke, light)
 
@@ -320,23 +311,32 @@ class Roll:
             factors[some] = density_means(seen, strength=_of_cells(strength, some, parts))
         return Parts(at, colour.reshape(-1, 3), factors.reshape(-1))
 
-    def _domain(self, smoke: Volume) -> Domain:
-        """The active cells of a frame."""
+    @property
+    def reached(self) -> Box:
+        """The cells that may ever be active."""
+        return self.box.grown(self.rule.config.dilation)
+
+    def domain(self, smoke: Volume, tile: Box | None = None) -> Domain:
+        """The active cells of a frame; those in a tile, if one is given."""
         if self.domain_kind == "box":
-            return self._whole_box
-        return Domain.around_smoke(
+            if tile is None:
+                return self._whole_box
+            Domain.require_fillable(self.reached)
+            return replace(Domain.filling(self.reached.intersection(tile)), box=self.reached)
+        domain = Domain.around_smoke(
             smoke.density_field,
             threshold=SMOKE_THRESHOLD * self.rule.scales.density,
             dilation=self.rule.config.dilation,
-            box=self.box.grown(self.rule.config.dilation),
+            box=self.reached,
         )
+        return domain if tile is None else domain.within(tile)
 
     @cached_property
     def _whole_box(self) -> Domain:
-        return Domain.filling(self.box.grown(self.rule.config.dilation))
+        return Domain.filling(self.reached)
 
 
-def _with_rest(session: Session, values: Any, number: int, *, rest: AnyArray) -> Any:
+def with_rest(session: Session, values: Any, number: int, *, rest: AnyArray) -> Any:
     """A state after a step in which some cells do nothing, `[n]` of them or all."""
     before = session.read(values).copy()
     after = session.read(session.run(values, range(number, number + 1))).copy()

@@ -3,10 +3,12 @@
 Reference: OpenVDB `io/GridDescriptor.cc`, `io/Archive.cc` (`readGrid`), `io/File.cc`.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+
+import numpy as np
 
 from vnca.core import Box
 from vnca.core.errors import GridError
@@ -19,9 +21,11 @@ from vnca.io.vdb.layout import (
     WRITTEN_VERSION,
     Compression,
     Cursor,
+    ValueType,
 )
 from vnca.io.vdb.metadata import Metadata, Transform, read_metadata, read_transform
-from vnca.io.vdb.tree import locate_leaves, read_tree
+from vnca.io.vdb.part import GridIndex
+from vnca.io.vdb.tree import Leaves, Tree, locate_leaves, read_tree
 
 _TREE_NAME = "Tree_{}_" + "_".join(map(str, TREE))
 
@@ -160,8 +164,8 @@ class GridHeader:
             return self
         cursor = self.source.cursor(self.tree_start, limit, self.name)
         value_type = VALUE_TYPES[self.value_type]
-        blocks = locate_leaves(cursor, value_type, is_half=self.is_half, flags=self.compression)
-        return replace(self, blocks=blocks, end=cursor.position)
+        leaves = locate_leaves(cursor, value_type, is_half=self.is_half, flags=self.compression)
+        return replace(self, blocks=leaves.begin, end=cursor.position)
 
     @property
     def transform(self) -> Transform:
@@ -195,9 +199,31 @@ class GridHeader:
             FileFormatError: If it is truncated, corrupt or of an unsupported kind.
             GridError: If the file has been closed or the transform is not linear.
         """
+        return self._grid(read_tree)
+
+    def indexed(self) -> GridIndex:
+        """The same with the values of no leaf: those of a part can be read then.
+
+        Raises:
+            FileFormatError: As of `read`, but for what is wrong with values.
+            GridError: As of `read`.
+        """
+        leaves: list[Leaves] = []
+
+        def located(cursor: Cursor, value_type: ValueType, **options: Any) -> Tree:
+            leaves.append(locate_leaves(cursor, value_type, **options))
+            return leaves[0].tree(self._cursor, np.empty(0, np.int64))
+
+        return GridIndex(self._grid(located), leaves[0], self._cursor)
+
+    def _cursor(self, begin: int) -> Cursor:
         owner = self.parent or self
         end = self.source.size if owner.end is None else owner.end
-        cursor = self.source.cursor(owner.tree_start or 0, end, self.name)
+        return self.source.cursor(begin, end, self.name)
+
+    def _grid(self, read: Callable[..., Tree]) -> Grid:
+        owner = self.parent or self
+        cursor = self._cursor(owner.tree_start or 0)
         if (value_type := VALUE_TYPES.get(self.value_type)) is None:
             raise cursor.error(
                 f"cannot read values of type {self.value_type}, only {', '.join(VALUE_TYPES)}"
@@ -207,7 +233,7 @@ class GridHeader:
             raise cursor.error(f"its tree lies behind a {owner.map_type} of unknown length")
         if owner.compression > _ALL_FLAGS:
             raise cursor.error(f"unknown compression {int(owner.compression)}")
-        tree = read_tree(cursor, value_type, is_half=self.is_half, flags=owner.compression)
+        tree = read(cursor, value_type, is_half=self.is_half, flags=owner.compression)
         if cursor.remaining:
             raise cursor.error(f"corrupt: {cursor.remaining} bytes follow the last leaf")
         name = decoded(self.grid_name)
