@@ -7,6 +7,7 @@ told of the frame as a whole, as its box, is the same, and so is every value in 
 import math
 import threading
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -132,6 +133,7 @@ class VdbSmoke(SmokeParts):
         frame: Its number.
         lattice: On whose cells it lies, cell on cell.
         place: From the file's cells to those.
+        indices: Of all the grids that are read.
     """
 
     file: VdbFile
@@ -139,7 +141,7 @@ class VdbSmoke(SmokeParts):
     frame: int
     lattice: Lattice
     place: Placement
-    _indices: dict[str, GridIndex]
+    indices: Mapping[str, GridIndex]
     _range: tuple[float, float] = field(default=(0.0, 0.0), init=False)
     _one_reader: threading.Lock = field(default_factory=threading.Lock, init=False)
 
@@ -151,7 +153,7 @@ class VdbSmoke(SmokeParts):
     @property
     def density(self) -> GridIndex:
         """Its density, in the file."""
-        return self._indices[self.format.density_grid]
+        return self.indices[self.format.density_grid]
 
     def holds(self, box: Box) -> bool:
         """See `SmokeParts.holds`."""
@@ -164,15 +166,16 @@ class VdbSmoke(SmokeParts):
 
     def _part(self, box: Box, *, motion: bool) -> Volume:
         format = self.format if motion else replace(self.format, velocity_grid=NO_VELOCITY)
-        near = self.place.inverse.box(box).grown(_VELOCITY_REACH)
+        wanted = self.place.inverse.box(box)
+        near = wanted.grown(_VELOCITY_REACH)
+        if any(index.is_filled for index in self.indices.values()):
+            # Where velocity is known only beside smoke, so must that be.
+            wanted = near.grown(_BESIDE)
 
         def read(header: GridHeader) -> Grid:
-            if header.name not in self._indices:
-                self._indices[header.name] = header.indexed()
-            index = self._indices[header.name]
-            is_density = header.name == format.density_grid
-            # Where velocity is known only near the smoke, that has to be known, too.
-            return index.part(near.grown(_BESIDE) if is_density else near)
+            return self.indices[header.name].part(
+                wanted if header.name == format.density_grid else near
+            )
 
         stored = smoke_in(self.file, format, read)
         (low, high), (least, most) = density_range(stored), self._range
@@ -214,7 +217,10 @@ def _in_file(file: VdbFile, format: SmokeFormat, frame: int, lattice: Lattice) -
     place = Placement.between(world, lattice.to_world, index.active_box, what)
     if not place.is_whole:
         return None
-    return VdbSmoke(file, format, frame, lattice, place, {header.name: index})
+    further = (file.grids[name] for name in format.fields if name in file.grids)
+    others = (*headers, *further)
+    indices = {header.name: index, **{each.name: each.indexed() for each in others}}
+    return VdbSmoke(file, format, frame, lattice, place, indices)
 
 
 def smoke_cells(path: Path, format: SmokeFormat) -> int:

@@ -213,7 +213,7 @@ def velocity_faces(
         place: Where the density's cells lie.
     """
     # A vector grid has one transform for all components, a scalar one its own.
-    axes = (None,) if len(headers) == 1 else (0, 1, 2)
+    axes = (0, 1, 2) if len(headers) == 3 else (None,) * len(headers)
     return [_is_on_faces(h, axis, format, place) for h, axis in zip(headers, axes, strict=True)]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from vnca.core import Box, IntArray
 from vnca.core.bricks import covered
 from vnca.core.field import Field
-from vnca.io.vdb.grid import Grid
+from vnca.io.vdb.grid import MOST_TILE_CELLS, Grid
 from vnca.io.vdb.layout import LEAF_EDGE, Cursor
 from vnca.io.vdb.tree import Leaves
 
@@ -57,6 +57,12 @@ class GridIndex:
             leaf_origins=self.leaves.origins, leaf_active=self.leaves.active
         )
         return replace(self.grid, tree=tree).active_box()
+
+    @property
+    def is_filled(self) -> bool:
+        """Whether active tiles fill more than fits, so that they count near other cells only."""
+        tiles = self.grid.tree.tiles
+        return float((tiles.edges[tiles.active].astype(float) ** 3).sum()) > MOST_TILE_CELLS
 
     def holds(self, box: Box) -> bool:
         """Whether a leaf or an active tile meets a box."""

@@ -22,15 +22,14 @@ def likely_halo(state: Kept, tiles: Sequence[Box], steps: int) -> int:
         tiles: Those of them that hold some.
         steps: How many have to be done.
     """
-    likely = [halo for halo in _LIKELY if halo <= steps] or [1]
-    return min(likely, key=lambda halo: _cost(state, tiles, steps, halo))
-
-
-def _cost(state: Kept, tiles: Sequence[Box], steps: int, halo: int) -> float:
-    rounds = -(-steps // halo)
     counts = unpacked(state.marks).sum(axis=(1, 2, 3))
-    worked = sum(_cells(state, counts, tile.grown(-(-steps // rounds))) for tile in tiles)
-    return worked * (steps + rounds * FETCH)
+
+    def cost(halo: int) -> float:
+        rounds = -(-steps // halo)
+        worked = sum(_cells(state, counts, tile.grown(-(-steps // rounds))) for tile in tiles)
+        return worked * (steps + rounds * FETCH)
+
+    return min([halo for halo in _LIKELY if halo <= steps] or [1], key=cost)
 
 
 def _cells(state: Kept, counts: AnyArray, box: Box) -> float:

@@ -6,7 +6,7 @@ around it can do K steps by itself; then those around it are fetched anew.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -65,6 +65,7 @@ class TiledRoll:
     tiling: Tiling
     folder: Path
     tell: Callable[[str], None]
+    _halos: dict[int, int] = field(default_factory=dict, init=False)
 
     @property
     def rolls(self) -> tuple[Roll, ...]:
@@ -224,7 +225,9 @@ class TiledRoll:
         if not numbers:
             return state
         tiles = [box for box in tiles_of(roll.reached, self.tiling.edge) if state.holds(box)]
-        halo = self.tiling.halo or likely_halo(state, tiles, len(numbers))
+        halo = self.tiling.halo or self._halos.get(len(numbers))
+        if halo is None:
+            halo = self._halos[len(numbers)] = likely_halo(state, tiles, len(numbers))
         rounds = max(1, -(-len(numbers) // halo))
         ends = [numbers.start + len(numbers) * end // rounds for end in range(rounds + 1)]
         for begin, end in pairwise(ends):
@@ -251,7 +254,9 @@ class TiledRoll:
         )
         fewest = rest_from + int(steps.min(initial=len(numbers)))
         together = range(numbers.start, max(numbers.start, min(numbers.stop, fewest)))
-        stepped = session.run(session.upload(_with_outside(values)), together)
+        begun = [_with_outside(values)]
+        del values  # nor has what they begin with a name, or it would be kept to the last step
+        stepped = session.run(session.upload(begun.pop()), together)
         for number in range(together.stop, numbers.stop):
             stepped = with_rest(session, stepped, number, rest=steps <= number - rest_from)
         inside = _in(cells, tile)
