@@ -67,8 +67,10 @@ class StoredState:
             ValueError: If there are cells beyond the box of the sequence.
         """
         box = self.roll.reached
-        for start in range(0, self.cells.get_shape()[0], _CELLS_AT_ONCE):
-            cells, values = (e[start : start + _CELLS_AT_ONCE] for e in (self.cells, self.values))
+        count = self.cells.get_shape()[0]
+        for start in range(0, count, _CELLS_AT_ONCE):
+            some = slice(start, min(start + _CELLS_AT_ONCE, count))
+            cells, values = self.cells[some], self.values[some]
             if not ((cells >= box.lower) & (cells < box.upper)).all():
                 raise ValueError(f"cells beyond {box}")
             yield cells, values

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from vnca.core import Box
 from vnca.core.errors import FileFormatError
 from vnca.core.volume import Volume
 from vnca.engine import Compute, native
+from vnca.io.painted.parts import tiles_of
 from vnca.io.parts import WholeSmoke
 from vnca.painting import Painting, Roll, StylizeConfig
 from vnca.painting.tiles import Tiling
@@ -74,10 +74,9 @@ def require_same(whole: Painting, tiled: TiledRoll, smoke: WholeSmoke, state: Ti
     edge, roll = tiled.tiling.edge * tiled.roll.finer, tiled.roll
     box = whole.smoke.box
     mass = tiled.mass(smoke, state)
-    lower = np.array(box.lower) // edge * edge
-    for corner in np.ndindex(*-(-(np.array(box.upper) - lower) // edge)):
-        x, y, z = (lower + np.array(corner) * edge).tolist()
-        tile = Box((x, y, z), (x + edge, y + edge, z + edge)).intersection(box)
+    every = list(tiles_of(box, edge))
+    some = {0, len(every) // 3, len(every) // 2, len(every) - 1}
+    for tile in (every[at].intersection(box) for at in some):
         part = tiled.painting(smoke, state, tile, mass)
         assert part.smoke.box == box
         pairs = [
@@ -99,7 +98,7 @@ def sorted_state(state: Any) -> tuple[Any, Any]:
 
 
 @settings(
-    max_examples=8,
+    max_examples=4,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
