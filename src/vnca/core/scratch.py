@@ -4,6 +4,7 @@ import math
 import tempfile
 import weakref
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -49,7 +50,8 @@ class Scratch:
         Raises:
             OutputError: If the disk is full.
         """
-        first, data = len(self), np.ascontiguousarray(rows, self.dtype)
+        first = len(self)
+        data: Any = np.ascontiguousarray(rows, self.dtype)
         assert data.shape[1:] == self.shape[1:], f"rows of {data.shape[1:]}, not {self.shape[1:]}"
         left = memoryview(data.reshape(-1)).cast("B")
         try:
@@ -70,7 +72,7 @@ class Scratch:
             self._fill(rows[begin:end], int(numbers[begin]))
         return rows
 
-    def _fill(self, rows: AnyArray, first: int) -> None:
+    def _fill(self, rows: Any, first: int) -> None:
         left = memoryview(rows.reshape(-1)).cast("B")
         try:
             self._file.seek(first * self._stride)

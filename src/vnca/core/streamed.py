@@ -6,7 +6,7 @@ The package safetensors writes what is in memory only. Reference: its README, "F
 import json
 import struct
 from collections.abc import Iterable, Mapping
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -53,6 +53,6 @@ def write_tensors(
     begin = file.tell()
     for tensor in tensors.values():
         for piece in tensor.pieces:
-            little = tensor.dtype.newbyteorder("<")
-            file.write(np.ascontiguousarray(piece, little).reshape(-1).view(np.uint8))
+            data: Any = np.ascontiguousarray(piece, tensor.dtype.newbyteorder("<"))
+            file.write(data.reshape(-1).view(np.uint8))
     assert file.tell() == begin + end, "pieces of other shapes than were told"

@@ -12,7 +12,7 @@ from vnca.core.errors import GridError, OptionError, OutputError, ShapeError
 from vnca.core.field import Field
 from vnca.core.lattice import Lattice, Placement
 from vnca.core.volume import Volume
-from vnca.io.painted.cells import PaintedCells, with_rim
+from vnca.io.painted.cells import PaintedCells, finer, with_rim
 from vnca.io.provenance import Provenance, without_provenance
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
@@ -190,7 +190,7 @@ def _paint_vdb(
         write_vdb(path, [], metadata=about)
         return
     header, old, cells = read_density(file, format)
-    transform = frame.transform(old.transform)
+    transform = finer(old.transform, frame.refine)
     density, colours = frame.stored(old, *old.fields(cells), f"{file.path}: grid {header.name!r}")
     background = old.tree.background
     new = Grid.from_fields(old.name, *density, like=old, transform=transform, background=background)
@@ -248,7 +248,7 @@ def _paint_other(
             name,
             values,
             stored,
-            transform=frame.transform(transform),
+            transform=finer(transform, frame.refine),
             grid_class="fog volume",
         )
         for name, values, stored in [

@@ -18,6 +18,13 @@ from vnca.io.velocity import extrapolated
 _HALF_MOST = float(np.finfo(np.float16).max)
 
 
+def finer(of_file: Transform, refine: int) -> Transform:
+    """The transform of painted cells; `of_file` is that of the file's."""
+    if refine == 1:
+        return of_file
+    return Transform.from_matrix(refined_transform(of_file.index_to_world, refine))
+
+
 class Stored(NamedTuple):
     """What a file is to store of a painting: values, and where they are active.
 
@@ -121,12 +128,6 @@ class PaintedCells:
         return Stored(
             (density, active), {name: (colour, coloured) for name, colour in colours.items()}
         )
-
-    def transform(self, of_file: Transform) -> Transform:
-        """That of the painted cells; `of_file` is that of the file's."""
-        if self.refine == 1:
-            return of_file
-        return Transform.from_matrix(refined_transform(of_file.index_to_world, self.refine))
 
     def _change(self, plain: Volume) -> Field:
         """What the painting multiplied the density by, less 1; 0 where there was none."""

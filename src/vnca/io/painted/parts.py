@@ -14,10 +14,10 @@ from vnca.core.lattice import Placement
 from vnca.core.scratch import Scratch
 from vnca.core.volume import refined_transform
 from vnca.io.painted import COLOUR_GRIDS, EMISSION, among, shared_metadata
-from vnca.io.painted.cells import PaintedCells
+from vnca.io.painted.cells import PaintedCells, finer
 from vnca.io.parts import VdbSmoke
 from vnca.io.provenance import Provenance, without_provenance
-from vnca.io.smoke_format import up_axis_of, upright_world
+from vnca.io.smoke_format import UpAxis, up_axis_of, upright_world
 from vnca.io.vdb import Grid, Tiles, Tree, write_vdb
 from vnca.io.vdb.layout import ValueType
 
@@ -58,7 +58,7 @@ class PaintedParts:
         self._smoke, self._folder, self._refine, self._beyond = smoke, folder, refine, beyond
         self._colour_grids = colour_grids
         self._index = smoke.density
-        self._up = up_axis_of(smoke.file.path, smoke.format)
+        self._up: UpAxis = up_axis_of(smoke.file.path, smoke.format)
         self._what = f"{smoke.file.path}: grid {self._index.grid.name!r}"
         self._box = self._index.active_box.refined(refine).grown(beyond)
         world = upright_world(self._index.grid.transform.index_to_world, self._up)
@@ -108,11 +108,7 @@ class PaintedParts:
         """
         file, old, waiting = self._smoke.file, self._index.grid, dict(self._waiting)
         header = file.grids[self._smoke.format.density_grid]
-        empty = PaintedCells(
-            *(Field.from_dense(np.empty((0, 0, 0)), (0, 0, 0)), {}, self._smoke.lattice),
-            *(self._up, self._refine, self._beyond),
-        )
-        transform = empty.transform(old.transform)
+        transform = finer(old.transform, self._refine)
         density = waiting.pop("").grid(old.name, like=old, transform=transform)
         options: Mapping[str, Any] = {
             "transform": transform,

@@ -56,7 +56,7 @@ class Kept:
 
     def _meeting(self, box: Box) -> AnyArray:
         first, last = covered(self.bricks, box)
-        return (first < last).all(axis=1)
+        return np.asarray((first < last).all(axis=1))
 
     def _of(self, some: AnyArray) -> tuple[IntArray, FloatArray]:
         where = unpacked(self.marks[some])

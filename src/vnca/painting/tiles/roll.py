@@ -299,7 +299,7 @@ def _with_outside(values: FloatArray) -> FloatArray:
 
 
 def _in(cells: AnyArray, box: Box) -> AnyArray:
-    return ((cells >= box.lower) & (cells < box.upper)).all(axis=1)
+    return np.asarray(((cells >= box.lower) & (cells < box.upper)).all(axis=1))
 
 
 def _carried_in(carried: Carried, box: Box) -> Carried:
