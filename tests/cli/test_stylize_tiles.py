@@ -1,5 +1,7 @@
 """Painting by tiles as a user asks for it: the files of a painting of wholes."""
 
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -102,6 +104,23 @@ def test_a_painting_by_tiles_goes_on_without_them(
     outcome = vnca(*out, "--resume")
     assert "going on after 2 frames" in outcome.err
     assert files(tmp_path / "out") == whole
+
+
+@needs_native
+def test_sigterm_waits_for_the_frame(
+    vnca: Vnca, model: Path, smoke: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    advance = TiledRoll.advance
+
+    def terminated(self: TiledRoll, *arguments: Any) -> Any:
+        os.kill(os.getpid(), signal.SIGTERM)
+        return advance(self, *arguments)
+
+    monkeypatch.setattr(TiledRoll, "advance", terminated)
+    out = tmp_path / "out"
+    outcome = vnca("stylize", model, smoke, "--out", out, *QUICK, "--tile", 16)
+    assert outcome.code == 143
+    assert sorted(files(out)) == [".ball_0001.resume.safetensors", "ball_0001.vdb"]
 
 
 @needs_native

@@ -3,14 +3,14 @@
 import dataclasses
 import json
 from collections.abc import Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from math import inf
 from pathlib import Path
 
 import vnca
-from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.errors import BackendUnavailableError, OptionError, Terminated
 from vnca.core.files import remove_leftovers, writable_file, writable_folder
 from vnca.core.memory import free_memory, memory_budget
 from vnca.core.records import changed_fields
@@ -206,7 +206,9 @@ class _Count:
     done: int = 0
 
     def note(self, line: str) -> None:
-        self.watch.progress("painting", self.done, self.total, "frames", line)
+        # SIGTERM waits for the frame; who cancels does not.
+        with suppress(Terminated):
+            self.watch.progress("painting", self.done, self.total, "frames", line)
 
 
 def _tiling(
