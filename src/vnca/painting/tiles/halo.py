@@ -11,7 +11,8 @@ from vnca.painting.tiles.kept import Kept
 
 _LIKELY = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
 FETCH = 5.0
-"""What it costs to fetch a cell, make it ready for steps and write it back, in steps of a cell."""
+"""What it costs to fetch a cell, make it ready for steps and write it back, in steps of a cell: an
+estimate, on which no bit depends."""
 
 
 def likely_halo(state: Kept, tiles: Sequence[Box], steps: int) -> int:
