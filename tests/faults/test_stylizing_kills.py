@@ -53,6 +53,19 @@ def test_three_kills(program: Any, stylizing: list[object], tmp_path: Path) -> N
     survive(program, stylizing, tmp_path, kills=3, seed=1)
 
 
+def test_two_kills_of_a_painting_by_tiles(
+    program: Any, stylizing: list[object], tmp_path: Path
+) -> None:
+    survive(program, [*stylizing, "--tile", 16], tmp_path, kills=2, seed=3)
+
+
+@pytest.mark.slow
+def test_twenty_kills_of_paintings_by_tiles(
+    program: Any, stylizing: list[object], tmp_path: Path
+) -> None:
+    survive(program, [*stylizing, "--tile", 16, "--halo", 3], tmp_path, kills=20, seed=4)
+
+
 @pytest.mark.slow
 def test_fifty_kills(program: Any, stylizing: list[object], tmp_path: Path) -> None:
     survive(program, stylizing, tmp_path, kills=50, seed=2)

@@ -89,7 +89,7 @@ def measure_painting(
                 {
                     "grid": "x".join(map(str, case.grid)),
                     "occupancy": case.occupancy,
-                    "cells": len(roll._domain(first)),
+                    "cells": len(roll.domain(first)),
                     "steps": case.steps,
                     "hidden": case.hidden,
                     "dtype": precision,

@@ -164,7 +164,7 @@ class Volume:
     @property
     def cell_length(self) -> float:
         """World length of the edge of a cube as large as a cell."""
-        return float(np.cbrt(abs(np.linalg.det(self.index_to_world[:3, :3]))))
+        return length_of_cells(self.index_to_world)
 
     @property
     def cells_to_world(self) -> AnyArray:
@@ -203,6 +203,11 @@ class Volume:
             self.frame,
             {name: refined(held, factor) for name, held in self.named_fields.items()},
         )
+
+
+def length_of_cells(index_to_world: AnyArray) -> float:
+    """World length of the edge of a cube as large as a cell of a 4×4 matrix."""
+    return float(np.cbrt(abs(np.linalg.det(index_to_world[:3, :3]))))
 
 
 def refined_transform(index_to_world: AnyArray, factor: int) -> AnyArray:

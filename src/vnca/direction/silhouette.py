@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from vnca.core import AnyArray, FloatArray
-from vnca.core.bricks import EDGE, bricks_beside, cells_at
+from vnca.core.bricks import CELLS, EDGE, bricks_beside, cells_at
 from vnca.core.field import Field
 from vnca.direction.mixing import Answer, eased
 from vnca.direction.moment import HIGHEST, Moment, between
@@ -104,9 +104,25 @@ def _slope(field: Field, at: AnyArray) -> AnyArray:
     return slope / np.where(length > 0, length, 1)
 
 
-def of_mass(density: Field, before: Field) -> FloatArray:
-    """The values of a density with as much of it in all as there was before."""
-    now, was = (float(field.values.sum(dtype=np.float64)) for field in (density, before))
+def masses(density: Field) -> AnyArray:
+    """How much smoke there is in each brick, `[m]`, float64."""
+    values = density.values.reshape(len(density.bricks), CELLS)
+    return values.astype(np.float64).sum(axis=1)
+
+
+def total(masses: AnyArray) -> float:
+    """The sum of some masses, the same in whatever order they come."""
+    return math.fsum(masses.tolist())
+
+
+def of_mass(density: Field, now: float, was: float) -> FloatArray:
+    """The values of a density with as much of it in all as there was before.
+
+    Args:
+        density: The density.
+        now: How much there is, in all of its frame.
+        was: How much there was.
+    """
     if now <= 0 or now == was:
         return density.values
     return density.values * np.float32(was / now)

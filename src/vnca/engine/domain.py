@@ -93,13 +93,27 @@ class Domain:
         Raises:
             OptionError: If there are too many.
         """
+        cls.require_fillable(box)
+        return cls.from_mask(np.ones(box.shape, dtype=bool), box.lower)
+
+    @classmethod
+    def require_fillable(cls, box: Box) -> None:
+        """Refuse a box of too many cells to be active as a whole.
+
+        Raises:
+            OptionError: If it has too many.
+        """
         if math.prod(box.shape) > MOST_CELLS:
             raise OptionError(
                 f"`domain` box: the box of the smoke, {box.lower} to {box.upper}, has "
                 f"{math.prod(box.shape)} cells, and at most {MOST_CELLS} can be active; "
                 "use `domain` active"
             )
-        return cls.from_mask(np.ones(box.shape, dtype=bool), box.lower)
+
+    def within(self, box: Box) -> "Domain":
+        """Those of its cells that lie in a box."""
+        inside = ((self.cells >= box.lower) & (self.cells < box.upper)).all(axis=1)
+        return replace(self, cells=self.cells[inside])
 
     def __len__(self) -> int:
         """Number of cells alive."""

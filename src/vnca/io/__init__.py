@@ -88,7 +88,23 @@ def read_smoke(
     """
     path = Path(path)
     stored = _reader(path).read(path, format) if file is None else smoke_in(file, format)
-    density = _non_negative(stored.density, path)
+    require_density(density_range(stored), path)
+    return made_ours(stored, path, format, frame=frame, lattice=lattice)
+
+
+def made_ours(
+    stored: StoredSmoke,
+    path: Path,
+    format: SmokeFormat,
+    *,
+    frame: int,
+    lattice: Lattice | None,
+) -> Volume:
+    """Smoke as a file has it, as `read_smoke` gives it; of the density nothing is required.
+
+    Arguments and errors are those of `read_smoke`.
+    """
+    density = replace(stored.density, values=np.maximum(stored.density.values, 0))
     velocity = None if stored.velocity is None else _velocity(stored.velocity, stored, format, path)
     place, index_to_world = _upright(stored.index_to_world, path, format)
     if velocity is not None:
@@ -201,14 +217,28 @@ def _reader(path: Path) -> Reader:
     return reader_of(existing_file(path))
 
 
-def _non_negative(density: Field, path: Path) -> Field:
-    least, most = float(density.values.min(initial=0)), float(density.values.max(initial=0))
+def density_range(stored: StoredSmoke) -> tuple[float, float]:
+    """The least and the greatest density, or 0 where that is less or more."""
+    values = stored.density.values
+    return float(values.min(initial=0)), float(values.max(initial=0))
+
+
+def require_density(found: tuple[float, float], path: Path) -> None:
+    """Refuse a file whose density goes so far below zero that it is none.
+
+    Args:
+        found: The least and the greatest value.
+        path: The file.
+
+    Raises:
+        GridError: If it does.
+    """
+    least, most = found
     if least < -NEGATIVE_TOLERANCE * most:
         raise GridError(
             f"{path}: density goes from {least:g} to {most:g}; expected none below zero; "
             "choose another grid with `density_grid`"
         )
-    return replace(density, values=np.maximum(density.values, 0))
 
 
 def _to_cells_per_frame(smoke: StoredSmoke, format: SmokeFormat) -> AnyArray:

@@ -1,5 +1,6 @@
 """Smoke in OpenVDB files: which grids it is, and whether they fit together."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,18 +44,23 @@ def read_vdb_smoke(path: Path, format: SmokeFormat) -> StoredSmoke:
         return smoke_in(file, format)
 
 
-def smoke_in(file: VdbFile, format: SmokeFormat) -> StoredSmoke:
-    """As `read_vdb_smoke`, of a file that is open."""
+def smoke_in(
+    file: VdbFile, format: SmokeFormat, read: Callable[[GridHeader], Grid] = GridHeader.read
+) -> StoredSmoke:
+    """As `read_vdb_smoke`, of a file that is open; or of parts of its grids, if `read` gives those.
+
+    A velocity on other cells than the density's is always read as a whole.
+    """
     if not file.grids:
         nothing = Field.from_dense(np.zeros((0, 0, 0), np.float32), (0, 0, 0))
         return StoredSmoke(nothing, np.eye(4), None)
-    header, grid, box = read_density(file, format)
+    header, grid, box = read_density(file, format, read)
     density, _ = _finite(header, grid, box)
     return StoredSmoke(
         density,
         header.transform.index_to_world,
-        _read_velocity(file, format, density, header.transform),
-        {name: _read_field(file, name, density, header.transform) for name in format.fields},
+        _read_velocity(file, format, density, header.transform, read),
+        {name: _read_field(file, name, density, header.transform, read) for name in format.fields},
     )
 
 
@@ -116,8 +122,10 @@ def _can_be_density(header: GridHeader) -> bool:
     return components(header) == 1 and header.grid_class != "level set"
 
 
-def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, Box]:
-    """The density grid, and the smallest box around its active cells.
+def read_density(
+    file: VdbFile, format: SmokeFormat, read: Callable[[GridHeader], Grid] = GridHeader.read
+) -> tuple[GridHeader, Grid, Box]:
+    """The density grid, and the smallest box around its active cells; `read` gives it, or a part.
 
     Raises:
         FileFormatError: If it is truncated or corrupt.
@@ -125,7 +133,7 @@ def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, 
     """
     header = density_header(file, format)
     label = f"{file.path}: grid {header.name!r}"
-    grid = header.read()
+    grid = read(header)
     box = grid.active_box()
     if header.box is not None and header.box.union(box) != header.box:
         raise FileFormatError(f"{label} has active cells outside the box its metadata gives")
@@ -137,7 +145,9 @@ def read_density(file: VdbFile, format: SmokeFormat) -> tuple[GridHeader, Grid, 
     return header, grid, box
 
 
-def _read_field(file: VdbFile, name: str, density: Field, place: Transform) -> Field:
+def _read_field(
+    file: VdbFile, name: str, density: Field, place: Transform, read: Callable[[GridHeader], Grid]
+) -> Field:
     """A further grid of numbers at the cells of the density, zero where it is inactive.
 
     Raises:
@@ -155,11 +165,15 @@ def _read_field(file: VdbFile, name: str, density: Field, place: Transform) -> F
             f"{label} has other cells than the density; resample it onto those, or leave it out of "
             "`fields`"
         )
-    return _finite(header, header.read(), density.box, near=density.bricks)[0]
+    return _finite(header, read(header), density.box, near=density.bricks)[0]
 
 
 def _read_velocity(
-    file: VdbFile, format: SmokeFormat, density: Field, place: Transform
+    file: VdbFile,
+    format: SmokeFormat,
+    density: Field,
+    place: Transform,
+    read: Callable[[GridHeader], Grid],
 ) -> StoredVelocity | None:
     headers = velocity_headers(file, format)
     if not headers and file.unfound and format.velocity_grid is None:
@@ -169,15 +183,13 @@ def _read_velocity(
         )
     if not headers:
         return None
-    # A vector grid has one transform for all components, a scalar one its own.
-    axes = (None,) if len(headers) == 1 else (0, 1, 2)
-    faces = [_is_on_faces(h, axis, format, place) for h, axis in zip(headers, axes, strict=True)]
+    faces = velocity_faces(headers, format, place)
     told = len(headers) == 1 and headers[0].metadata.value(UNITS_METADATA) == CELLS_PER_FRAME
     if None in faces:
         return resampled_velocity(headers, format, density, place, told=told)
     x, *others = map(bool, faces)
     y, z = others or (x, x)
-    parts = [_around(header, density) for header in headers]
+    parts = [_around(header, density, read) for header in headers]
     if len(headers) == 1:
         return StoredVelocity(*parts[0], (x, y, z), told)
     whole = parts[0][0].box
@@ -188,6 +200,21 @@ def _read_velocity(
     return StoredVelocity(
         Field(bricks, values, whole), Field(bricks, stored, whole, outside=False), (x, y, z)
     )
+
+
+def velocity_faces(
+    headers: Sequence[GridHeader], format: SmokeFormat, place: Transform
+) -> list[bool | None]:
+    """Which grids of a velocity lie on lower faces; None for one of other cells than the density's.
+
+    Args:
+        headers: One grid of vectors, or those of the components x, y and z.
+        format: Whether velocity is staggered, unless the grids are to say.
+        place: Where the density's cells lie.
+    """
+    # A vector grid has one transform for all components, a scalar one its own.
+    axes = (0, 1, 2) if len(headers) == 3 else (None,) * len(headers)
+    return [_is_on_faces(h, axis, format, place) for h, axis in zip(headers, axes, strict=True)]
 
 
 def _is_on_faces(
@@ -209,13 +236,15 @@ def _is_on_faces(
     return is_shifted or header.grid_class == "staggered"
 
 
-def _around(header: GridHeader, density: Field) -> tuple[Field, Field]:
+def _around(
+    header: GridHeader, density: Field, read: Callable[[GridHeader], Grid]
+) -> tuple[Field, Field]:
     """Values with one layer more than the density at upper ends, and which cells are active.
 
     Raises:
         GridError: If the grid holds cells, but none of those.
     """
-    grid, box = header.read(), density.box
+    grid, box = read(header), density.box
     whole, there = upper_grown(box), grid.active_box()
     if not there.is_empty and not box.is_empty and there.intersection(whole).is_empty:
         raise GridError(

@@ -7,7 +7,7 @@ of a sequence.
 Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
-from vnca.direction import Carried, Direction, Inputs, Moment
+from vnca.direction import NUMBERS, Carried, Direction, Inputs, Moment
 from vnca.direction.carried import carry
 from vnca.direction.colour import Editing
 from vnca.direction.mixing import Answer, Parts, layered
@@ -144,8 +144,8 @@ class Roll:
         Raises:
             GridError: If the smoke lacks what the rule is conditioned on.
         """
-        domain = self._domain(smoke)
-        rule = self._rule(smoke)
+        domain = self.domain(smoke)
+        rule = self.rule_of(smoke)
         layers = tuple(layer.ready(smoke) for layer in self.layers)
         if len(domain) == 0:
             return Ready(smoke, domain, None, rule, layers=layers)
@@ -166,12 +166,12 @@ class Roll:
             state: What the frame before it left.
         """
         ready = smoke if isinstance(smoke, Ready) else self.ready(smoke)
-        moment = self._moment(ready.smoke, state.carried)
+        moment = self.moment(ready.smoke, state.carried)
         state, parts = self._stepped(ready, state, moment)
         del ready, smoke  # what follows makes arrays of the same order
-        return self._painting(moment, parts, replace(state, carried=moment.carried))
+        return self.painting(moment, parts, replace(state, carried=moment.carried))
 
-    def _rule(self, smoke: Volume) -> Rule:
+    def rule_of(self, smoke: Volume) -> Rule:
         """The rule with the weights of a frame."""
         if not self.blend:
             return self.rule
@@ -185,37 +185,68 @@ class Roll:
     ) -> RollState:
         """What a frame leaves to the next, unpainted; see `paint`."""
         ready = smoke if isinstance(smoke, Ready) else self.ready(smoke)
-        moment = at or self._moment(ready.smoke, state.carried)
+        moment = at or self.moment(ready.smoke, state.carried)
         each = zip(self.layers, ready.layers, state.layers, strict=True)
         layers = tuple(layer.passed(on, left, moment) for layer, on, left in each)
         return replace(self._advanced(ready, state, moment), carried=moment.carried, layers=layers)
 
-    def _moment(self, smoke: Volume, carried: Carried | None) -> Moment:
+    def moment(self, smoke: Volume, carried: Carried | None) -> Moment:
         """A frame as the direction is asked about it, and what smoke carried to it."""
-        threshold = SMOKE_THRESHOLD * self.rule.scales.density
-        moment = Moment(smoke, self.box, threshold, self.grid, self.inputs)
+        moment = self.moment_of(smoke)
         return replace(moment, carried=carry(carried, self.config.parts(), moment))
+
+    def moment_of(self, smoke: Volume) -> Moment:
+        """The same with nothing carried."""
+        threshold = SMOKE_THRESHOLD * self.rule.scales.density
+        return Moment(smoke, self.box, threshold, self.grid, self.inputs)
+
+    def told(self, ready: Ready, moment: Moment) -> FloatArray:
+        """What the cells of a frame are conditioned on, `[n, P]`, styles as they are mixed."""
+        given = ready.conditioning
+        if given is None:
+            given = priors(ready.domain, ready.smoke, ready.rule)
+        if not self.styles:
+            return given
+        count = self.rule.config.style_count
+        shares = self.config.mix("style_mix", self.styles, count, moment, ready.domain.cells)
+        return in_shares(given, self.rule, shares)
 
     def _stepped(self, ready: Ready, state: RollState, moment: Moment) -> tuple[RollState, Parts]:
         """The state after the steps of a frame, and what is painted, layers over each other."""
-        before = state.layers
-        state = self._advanced(ready, state, moment)
-        parts = self._parts(ready, state, moment)
-        layers = []
-        for number, layer in enumerate(self.layers):
-            left, above = layer._stepped(ready.layers[number], before[number], moment)
-            layers.append(left)
+        left = [
+            roll._advanced(each, before, moment)
+            for roll, each, before in zip(
+                (self, *self.layers),
+                (ready, *ready.layers),
+                (state, *state.layers),
+                strict=True,
+            )
+        ]
+        parts = self.seen((ready, *ready.layers), left, moment)
+        return replace(left[0], layers=tuple(left[1:])), parts
+
+    def seen(self, ready: Sequence[Ready], states: Sequence[RollState], moment: Moment) -> Parts:
+        """What is painted, layers over each other.
+
+        Args:
+            ready: What this rule takes, and what those of its layers do.
+            states: Their states.
+            moment: The frame.
+        """
+        parts, *above = (
+            roll._parts(each, state, moment)
+            for roll, each, state in zip((self, *self.layers), ready, states, strict=True)
+        )
+        for number, layer in enumerate(above):
             share = self.config.share(number, moment, self._places(parts.at))
-            parts = layered(parts, above, share)
-        return replace(state, layers=tuple(layers)), parts
+            parts = layered(parts, layer, share)
+        return parts
 
     def _advanced(self, ready: Ready, state: RollState, moment: Moment) -> RollState:
         """The state of this rule alone after the steps of a frame."""
         domain, session = ready.domain, ready.session
-        if session is not None and ready.conditioning is not None:
-            count = self.rule.config.style_count
-            shares = self.config.mix("style_mix", self.styles, count, moment, domain.cells)
-            session = session.conditioned(in_shares(ready.conditioning, self.rule, shares))
+        if session is not None and self.styles:
+            session = session.conditioned(self.told(ready, moment))
         if session is None:
             return RollState.empty(self.rule.config.channels, state.steps_done)
         steering = self.config.steering(moment, domain.cells)
@@ -224,31 +255,31 @@ class Roll:
         warmup = self.config.warmup if len(state.cells) == 0 else 0
         warmup *= self.config.substeps
         done = state.steps_done + warmup
-        steps = self._steps(moment, domain)
+        steps = self.steps(moment, domain)
         fewest, most = int(np.min(steps)), int(np.max(steps))
         # What they begin with has no name here, or it would be kept to the last step.
         values = session.run(
-            session.upload(self._begun(ready, state, moment)),
+            session.upload(self.begun(ready, state, moment)),
             range(state.steps_done, done + fewest),
         )
         for step in range(fewest, most):
-            values = _with_rest(session, values, done + step, rest=np.asarray(steps) <= step)
+            values = with_rest(session, values, done + step, rest=np.asarray(steps) <= step)
         return RollState(domain.cells, session.read(values), done + most, ready.smoke.frame)
 
-    def _steps(self, moment: Moment, domain: Domain) -> AnyArray | int:
+    def steps(self, moment: Moment, domain: Domain) -> AnyArray | int:
         """How many steps the cells do, all as many or each its own, `[n]`."""
         if self.config.steps_per_frame is None:
             return self.rule.config.steps_per_frame * self.config.substeps
         asked: Answer = self.config.value("steps_per_frame", moment, domain.cells)
         return np.rint(asked).astype(int) * self.grid * self.config.substeps
 
-    def _begun(self, ready: Ready, state: RollState, moment: Moment) -> FloatArray:
+    def begun(self, ready: Ready, state: RollState, moment: Moment) -> FloatArray:
         """What the cells of a frame begin with, of the state that the one before it left."""
         smoke, domain = ready.smoke, ready.domain
         if len(state.cells) == 0:
             return domain.seed(self.rule.config.channels)
         before, velocity = Domain(state.cells, domain.box), smoke.velocity_field
-        speed = self._pattern_speed(moment, domain)
+        speed = self.pattern_speed(moment, domain)
         if velocity is None or not np.any(speed):
             return before.carry(state.values, domain)
         frames = 1 if state.frame is None else max(1, smoke.frame - state.frame)
@@ -256,7 +287,15 @@ class Roll:
             state.values, before, domain, velocity, speed * frames, threads=self.compute.threads
         )
 
-    def _pattern_speed(self, moment: Moment, domain: Domain) -> Answer:
+    @property
+    def fastest(self) -> float:
+        """How many times as fast as the velocity the pattern is carried, at most."""
+        if self.config.pattern_speed is None:
+            return float(self.rule.config.transport)
+        asked = self.config.values["pattern_speed"]
+        return abs(asked.number) if isinstance(asked, Constant) else NUMBERS["pattern_speed"].high
+
+    def pattern_speed(self, moment: Moment, domain: Domain) -> Answer:
         """How fast the velocity carries the pattern, everywhere or in each cell, `[n]`."""
         if self.config.pattern_speed is None:
             return float(self.rule.config.transport)
@@ -271,14 +310,23 @@ class Roll:
             return at
         return (at + 0.5) / self.finer - 0.5
 
-    def _painting(self, moment: Moment, parts: Parts, state: RollState) -> Painting:
-        """The frame as a state shows it, on the grid of the painting."""
+    def painting(
+        self, moment: Moment, parts: Parts, state: Any, mass: tuple[float, float] | None = None
+    ) -> Painting:
+        """The frame as a state shows it, on the grid of the painting.
+
+        Args:
+            moment: The frame.
+            parts: What is painted.
+            state: What is left to the next.
+            mass: As of `composed`.
+        """
         smoke = moment.smoke.refined(self.finer)
         if self.config.fluff and not smoke.box.is_empty:
             smoke = smoke.within(smoke.box.grown(self.beyond))
         reach = self.colour_dilation * self.finer
         density, colour, light = composed(
-            smoke, parts, self.config, moment, self._places, editing=self.editing, reach=reach
+            smoke, parts, self.config, moment, self._places, self.editing, reach=reach, mass=mass
         )
         return Painting.of_fields(smoke, density, colour, state, moment.smoke, light)
 
@@ -307,23 +355,32 @@ class Roll:
             factors[some] = density_means(seen, strength=_of_cells(strength, some, parts))
         return Parts(at, colour.reshape(-1, 3), factors.reshape(-1))
 
-    def _domain(self, smoke: Volume) -> Domain:
-        """The active cells of a frame."""
+    @property
+    def reached(self) -> Box:
+        """The cells that may ever be active."""
+        return self.box.grown(self.rule.config.dilation)
+
+    def domain(self, smoke: Volume, tile: Box | None = None) -> Domain:
+        """The active cells of a frame; those in a tile, if one is given."""
         if self.domain_kind == "box":
-            return self._whole_box
-        return Domain.around_smoke(
+            if tile is None:
+                return self._whole_box
+            Domain.require_fillable(self.reached)
+            return replace(Domain.filling(self.reached.intersection(tile)), box=self.reached)
+        domain = Domain.around_smoke(
             smoke.density_field,
             threshold=SMOKE_THRESHOLD * self.rule.scales.density,
             dilation=self.rule.config.dilation,
-            box=self.box.grown(self.rule.config.dilation),
+            box=self.reached,
         )
+        return domain if tile is None else domain.within(tile)
 
     @cached_property
     def _whole_box(self) -> Domain:
-        return Domain.filling(self.box.grown(self.rule.config.dilation))
+        return Domain.filling(self.reached)
 
 
-def _with_rest(session: Session, values: Any, number: int, *, rest: AnyArray) -> Any:
+def with_rest(session: Session, values: Any, number: int, *, rest: AnyArray) -> Any:
     """A state after a step in which some cells do nothing, `[n]` of them or all."""
     before = session.read(values).copy()
     after = session.read(session.run(values, range(number, number + 1))).copy()

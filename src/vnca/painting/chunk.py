@@ -5,14 +5,13 @@ chunk are stepped through and not painted, the pre-roll, so that chunks need not
 other. Both are exact. A pre-roll of fewer frames is not: docs/guide/farm.md says how far.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from vnca.core.errors import OptionError, SequenceError
 from vnca.io.sequence import FrameSequence, parse_frames
-from vnca.painting import Roll
 from vnca.painting.unfinished import Unfinished
 
 
@@ -93,17 +92,27 @@ class Chunk:
         return cls(first, stop, begin, asked.state_in, asked.state_out)
 
     def start(
-        self, sequence: FrameSequence, conditions: Mapping[str, Any], roll: Roll
+        self,
+        sequence: FrameSequence,
+        conditions: Mapping[str, Any],
+        start: Any,
+        handed_over: Callable[[Path], Unfinished],
     ) -> Unfinished:
         """What it begins with: what was handed over, or nothing before its pre-roll.
+
+        Args:
+            sequence: All frames.
+            conditions: What the bytes of a frame follow from.
+            start: The state before the first frame.
+            handed_over: Reads what a chunk left.
 
         Raises:
             OptionError: If another painting handed it over, or another chunk of it.
             FileFormatError: If that file is missing or damaged.
         """
         if self.state_in is None:
-            return Unfinished(conditions, (None,) * self.begin, roll.start())
-        before = Unfinished.load(self.state_in, conditions, roll, handed_over=True)
+            return Unfinished(conditions, (None,) * self.begin, start)
+        before = handed_over(self.state_in)
         if (count := len(before.sources)) != self.first:
             follows = sequence[count].number if count < len(sequence) else "none"
             raise OptionError(

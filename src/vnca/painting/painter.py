@@ -20,13 +20,13 @@ from vnca.core.errors import (
 )
 from vnca.core.files import existing_file, remove_file, remove_leftovers
 from vnca.core.lattice import Lattice
-from vnca.core.volume import Volume
+from vnca.core.volume import Volume, length_of_cells, refined_transform
 from vnca.io import SmokeFormat, open_source, read_smoke, write_painted
 from vnca.io.provenance import Provenance, read_provenance
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import up_axis_of
 from vnca.io.vdb import VdbFile
-from vnca.painting import Ready, Roll, RollState
+from vnca.painting import Ready, Roll
 from vnca.painting.chunk import WHOLE, Chunk
 from vnca.painting.frames import VelocityCheck, read_ahead
 from vnca.painting.unfinished import Source, Unfinished
@@ -41,20 +41,20 @@ _SAVING_SHARE = 0.02
 
 
 @dataclass(eq=False)
-class _Read:
+class Read:
     """A frame to be painted, and where it is from.
 
     Attributes:
         source: What it is from.
         frame: Which one it is.
-        smoke: As fine as it is painted.
+        smoke: As fine as it is painted; or of which parts can be had.
         file: Stays open for writing.
         ready: The same made ready, until that is taken.
     """
 
     source: Source
     frame: Frame
-    smoke: Volume
+    smoke: Any
     file: VdbFile | None
     ready: Ready | None
 
@@ -80,8 +80,8 @@ class _Read:
             self.file.close()
 
 
-def _close(read: _Read | VncaError | None) -> None:
-    if isinstance(read, _Read):
+def _close(read: Read | VncaError | None) -> None:
+    if isinstance(read, Read):
         read.close()
 
 
@@ -162,7 +162,7 @@ class Painter:
         path, first, left = self.unfinished_path, self.chunk.first, self.chunk.state_out
         remove_leftovers(self.out, {self.target(f).name for f in self.frames} | {path.name})
         if path.exists() and resume:
-            unfinished = Unfinished.load(path, self.conditions, self.roll)
+            unfinished = self._loaded(path)
             self._require_unchanged(unfinished.sources)
             done = max(0, len(unfinished.sources) - first)
             self.tell(f"{self.out}: going on after {done} frames")
@@ -170,9 +170,9 @@ class Painter:
         if resume and self._is_complete():
             self.tell(f"{self.out}: all {len(self.frames)} frames are painted already")
             if left is not None:
-                return Unfinished.load(left, self.conditions, self.roll, handed_over=True)
+                return self._loaded(left, handed_over=True)
             sources = tuple(self._source(first + at) for at in range(len(self.frames)))
-            return Unfinished(self.conditions, (None,) * first + sources, self.roll.start())
+            return Unfinished(self.conditions, (None,) * first + sources, self._start())
         there = [target for target in map(self.target, self.frames) if target.exists()]
         if path.exists() and not overwrite:
             raise OutputError(
@@ -187,7 +187,8 @@ class Painter:
             )
         if resume:
             self.tell(f"{self.out}: nothing unfinished there; starting with the first frame")
-        return self.chunk.start(self.sequence, self.conditions, self.roll)
+        handed_over = partial(self._loaded, handed_over=True)
+        return self.chunk.start(self.sequence, self.conditions, self._start(), handed_over)
 
     def _is_complete(self) -> bool:
         """Whether every frame is there, painted by this rule in this way from what it is now."""
@@ -257,8 +258,8 @@ class Painter:
         remove_file(self.unfinished_path)
 
     def _finish(
-        self, frame: Frame, read: _Read | VncaError, held: _Read | None, left: Unfinished
-    ) -> tuple[_Read | None, RollState, Source | None]:
+        self, frame: Frame, read: Read | VncaError, held: Read | None, left: Unfinished
+    ) -> tuple[Read | None, Any, Source | None]:
         """Paint a frame or do what is to be done if it is broken."""
         try:
             if isinstance(read, VncaError):
@@ -276,17 +277,29 @@ class Painter:
                 remove_file(self.target(frame))
             return held, left.state, None
 
-    def _write(self, frame: Frame, read: _Read, left: Unfinished) -> RollState:
-        """Paint smoke to the file of a frame, unless it comes before the chunk; the state after."""
-        self._velocity.look(read.smoke, read.frame.path)
-        if frame not in self.frames:
-            return self.roll.passed(read.take(), left.state)
-        painting = self.roll.paint(read.take(), left.state)
+    def _start(self) -> Any:
+        """The state before the first frame."""
+        return self.roll.start()
+
+    def _loaded(self, path: Path, *, handed_over: bool = False) -> Unfinished:
+        """What an earlier run left, or the chunk before this one."""
+        return Unfinished.load(path, self.conditions, self.roll, handed_over=handed_over)
+
+    def _begin_to_write(self, frame: Frame, read: Read, left: Unfinished) -> None:
+        """Look whether the file of a frame may be written now, when it was painted."""
         read.require_unchanged()
         if frame == self.frames[0]:
             # From here on frames of an earlier painting are overwritten, and after an end at any
             # moment it is this one that can be gone on with.
             left.save(self.unfinished_path)
+
+    def _write(self, frame: Frame, read: Read, left: Unfinished) -> Any:
+        """Paint smoke to the file of a frame, unless it comes before the chunk; the state after."""
+        self._velocity.look(read.smoke, read.frame.path)
+        if frame not in self.frames:
+            return self.roll.passed(read.take(), left.state)
+        painting = self.roll.paint(read.take(), left.state)
+        self._begin_to_write(frame, read, left)
         write_painted(
             self.target(frame),
             read.frame.path,
@@ -297,24 +310,27 @@ class Painter:
             lattice=self.lattice,
             colour_grids=self.colour_grids,
             refine=self.refine,
-            provenance=self._provenance(read),
+            provenance=self.provenance(read),
             file=read.file,
             emission=painting.emission,
             beyond=self.roll.beyond,
         )
         return painting.state
 
-    def _provenance(self, read: _Read) -> Provenance:
+    def provenance(self, read: Read) -> Provenance:
         """What the painting of a frame tells of itself."""
-        scales = self.roll.rule.scales
+        scales, grid = self.roll.rule.scales, self.roll.grid
+        cells = self.lattice.to_world
+        if grid > 1:
+            cells = refined_transform(cells, grid)
         return Provenance(
-            scales.extinction(read.smoke.cell_length),
-            scales.gamma * self.roll.grid,
+            scales.extinction(length_of_cells(cells)),
+            scales.gamma * grid,
             up_axis_of(read.frame.path, self.smoke),
             {**self.facts, MARK: self.mark},
         )
 
-    def _read(self, at: int) -> _Read | VncaError:
+    def _read(self, at: int) -> Read | VncaError:
         """A frame of the sequence, or what is wrong with it."""
         frame = self.sequence[at]
         with ExitStack() as opened:
@@ -323,28 +339,38 @@ class Painter:
                 file = open_source(frame.path)
                 if file is not None:
                     opened.enter_context(file)
-                smoke = read_smoke(
-                    frame.path, self.smoke, frame=frame.number, lattice=self.lattice, file=file
-                ).refined(self.roll.grid)
-                if self.roll.box.union(smoke.box) != self.roll.box:
+                smoke = self._opened(frame, file)
+                box = smoke.box.refined(self.roll.grid)
+                if self.roll.box.union(box) != self.roll.box:
                     return GridError(
                         f"{frame.path}: has changed since the start and now has smoke beyond the "
                         "box of the sequence; start anew"
                     )
-                ready = self.roll.ready(smoke)
+                smoke, ready = self._made_ready(smoke)
             except BROKEN as error:
                 return error
             except OSError as error:
                 return FileFormatError(f"{frame.path}: cannot be read ({error.strerror})")
             opened.pop_all()  # it is closed once the frame is painted
-            return _Read(source, frame, smoke, file, ready)
+            return Read(source, frame, smoke, file, ready)
+
+    def _opened(self, frame: Frame, file: VdbFile | None) -> Any:
+        """The smoke of a frame."""
+        return read_smoke(
+            frame.path, self.smoke, frame=frame.number, lattice=self.lattice, file=file
+        )
+
+    def _made_ready(self, smoke: Any) -> tuple[Any, Ready | None]:
+        """The same as fine as it is painted, and what painting takes of it beforehand."""
+        smoke = smoke.refined(self.roll.grid)
+        return smoke, self.roll.ready(smoke)
 
     def _source(self, at: int) -> Source:
         """What a frame of the sequence is painted from, as it is now."""
         status = existing_file(self.sequence[at].path).stat()
         return Source(at, status.st_size, status.st_mtime_ns)
 
-    def _held(self, sources: Sequence[Source | None]) -> _Read | None:
+    def _held(self, sources: Sequence[Source | None]) -> Read | None:
         """The last frame that was not broken, where it may be wanted again."""
         last = next((source for source in reversed(sources) if source), None)
         if self.on_error != "hold" or last is None:

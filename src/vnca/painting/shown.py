@@ -13,11 +13,11 @@ from vnca.core.volume import Volume, dense, field_of
 from vnca.direction import Direction, Moment
 from vnca.direction.colour import Editing
 from vnca.direction.mixing import Parts, per_colour
-from vnca.direction.silhouette import of_mass
+from vnca.direction.silhouette import masses, of_mass, total
 from vnca.io.velocity import extrapolated
 
 if TYPE_CHECKING:
-    from vnca.painting import RollState
+    from vnca.painting.state import RollState
 
 UNPAINTED = 1.0
 """Linear colour of smoke far from all that the rule paints: white."""
@@ -81,9 +81,10 @@ def composed(
     direction: Direction,
     moment: Moment,
     places: Callable[[AnyArray], AnyArray],
-    *,
     editing: Editing,
+    *,
     reach: int,
+    mass: tuple[float, float] | None = None,
 ) -> tuple[Field, Field, Field | None]:
     """Density, colour and, if anything burns, light of a frame.
 
@@ -95,6 +96,7 @@ def composed(
         places: Where points of that grid lie in index coordinates of the moment's smoke.
         editing: What is done with colours as a whole.
         reach: How many cells beyond what was painted its colour goes on.
+        mass: The smoke in all, as painted and before, if the frame is but a part.
     """
     box = smoke.box
     inside = ((parts.at >= box.lower) & (parts.at < box.upper)).all(axis=1)
@@ -109,7 +111,8 @@ def composed(
     density = replace(before, values=before.values * factors.blocks(before.bricks))
     density, colour = direction.fluffed(density, colour, factors, moment, places)
     if direction.keep_mass:
-        density = replace(density, values=of_mass(density, before))
+        now, was = mass or (total(masses(density)), total(masses(before)))
+        density = replace(density, values=of_mass(density, now, was))
     light = None
     if direction.burns:
         light = _continued(at, direction.emission(moment, there), box, 0.0, reach)

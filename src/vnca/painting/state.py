@@ -1,5 +1,6 @@
 """What goes from frame to frame of a painting, and a frame that is ready to be painted."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,6 +34,19 @@ class RollState:
     frame: int | None = None
     carried: Carried | None = None
     layers: tuple["RollState", ...] = ()
+
+    def __len__(self) -> int:
+        """How many cells are alive."""
+        return len(self.cells)
+
+    @property
+    def channels(self) -> int:
+        """How many numbers a cell has."""
+        return self.values.shape[1]
+
+    def pieces(self) -> Iterator[tuple[IntArray, FloatArray]]:
+        """Cells and their values, `[n, C]`, all of them."""
+        yield self.cells, self.values[:-1]
 
     @classmethod
     def empty(cls, channels: int, steps_done: int = 0) -> "RollState":

@@ -3,26 +3,32 @@
 import dataclasses
 import json
 from collections.abc import Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
 import vnca
-from vnca.core.errors import BackendUnavailableError, OptionError, SequenceError
+from vnca.core.errors import BackendUnavailableError, OptionError, SequenceError, Terminated
 from vnca.core.files import remove_leftovers, writable_file, writable_folder
+from vnca.core.memory import free_memory, memory_budget
 from vnca.core.records import changed_fields
 from vnca.core.volume import refined_transform
 from vnca.engine import Compute, choose, compute_of
 from vnca.io import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.painted import read_colour
+from vnca.io.parts import smoke_cells
 from vnca.io.provenance import read_provenance
+from vnca.io.sequence import FrameSequence
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.painting import Roll, StylizeConfig
 from vnca.painting.chunk import Chunk, Chunking
 from vnca.painting.painter import OnError, Painter
+from vnca.painting.tiles import EDGES, Tiling, bytes_needed, likely_edge
+from vnca.painting.tiles.painter import TiledPainter
 from vnca.recipe import Watch, recorded, tracked
 from vnca.recipe.directing import digest, directed, say_styles
 from vnca.recipe.film import Film, FilmConfig, Shown
@@ -68,6 +74,15 @@ class StylizeRun:
     precision: str = "float32"
     """What the native kernel rounds the factors of its products to; bfloat16 is quicker where the
     processor has it."""
+    memory_budget: str = "auto"
+    """Memory to paint with, such as 4GB: frames that take more are painted by tiles. Of itself that
+    happens where they would take more than half of what is free."""
+    tile: int | None = None
+    """Paint by tiles of so many cells of the automaton a side, a multiple of 8; the files are the
+    same."""
+    halo: int | None = None
+    """Cells around a tile that it is given at a time, and steps it does with them; the cheapest
+    unless given."""
     resume: bool = False
     """Go on with a painting that was ended before its last frame, to the very same files."""
     overwrite: bool = False
@@ -87,6 +102,8 @@ class StylizeRun:
     def __post_init__(self) -> None:
         Compute(self.backend, precision=self.precision)
         require_refinement(self.refine)
+        memory_budget(self.memory_budget)
+        Tiling(EDGES[0] if self.tile is None else self.tile, self.halo)
         for name in ("gamma", "density_scale"):
             value = getattr(self, name)
             if value is not None and not 0 < value < inf:
@@ -142,7 +159,8 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
     Raises:
         VncaError: If an input cannot be used or the output cannot be written.
     """
-    return _paint(_painter(options, watch, model), options, watch)
+    count = _Count(watch)
+    return _paint(_painter(options, watch, model, count), options, watch, count)
 
 
 def film_painted(options: StylizeRun, watch: Watch, model: Model | None = None) -> None:
@@ -157,7 +175,7 @@ def film_painted(options: StylizeRun, watch: Watch, model: Model | None = None) 
         SequenceError: If a frame is not there yet.
         VncaError: If an input cannot be used, or the film cannot be written.
     """
-    painter = _painter(options, watch, model)
+    painter = _painter(options, watch, model, _Count(watch))
     for target in map(painter.target, painter.frames):
         if not target.exists() or read_provenance(target) is None:
             raise SequenceError(f"{target}: is not painted yet; a film shows all of its frames")
@@ -170,7 +188,7 @@ def film_painted(options: StylizeRun, watch: Watch, model: Model | None = None) 
     watch.made("film", options.preview)
 
 
-def _painter(options: StylizeRun, watch: Watch, model: Model | None) -> Painter:
+def _painter(options: StylizeRun, watch: Watch, model: Model | None, count: "_Count") -> Painter:
     """What paints as asked, after a look at all that it takes."""
     model = model or Model.load(options.model)
     rule = model.rule.rescaled(density=options.density_scale, gamma=options.gamma)
@@ -196,7 +214,9 @@ def _painter(options: StylizeRun, watch: Watch, model: Model | None) -> Painter:
     say_styles(model, options.config, watch)
     roll = ready.roll
     facts = _facts(options, model, roll)
-    return Painter(
+    tiling = _tiling(options, roll, sequence, watch)
+    make = Painter if tiling is None else partial(TiledPainter, tiling=tiling, watch=count.note)
+    return make(
         sequence,
         options.out,
         roll,
@@ -235,9 +255,55 @@ def _painter(options: StylizeRun, watch: Watch, model: Model | None) -> Painter:
     )
 
 
-def _paint(painter: Painter, options: StylizeRun, watch: Watch) -> Iterator[Path | None]:
+@dataclass
+class _Count:
+    """Tells how many frames are painted, and what is being done with the next."""
+
+    watch: Watch
+    total: int = 0
+    done: int = 0
+
+    def note(self, line: str) -> None:
+        # SIGTERM waits for the frame; who cancels does not.
+        with suppress(Terminated):
+            self.watch.progress("painting", self.done, self.total, "frames", line)
+
+
+def _tiling(
+    options: StylizeRun, roll: Roll, sequence: FrameSequence, watch: Watch
+) -> Tiling | None:
+    """How frames are cut; None where they are painted as wholes."""
+    if options.config.steers:
+        if options.tile is not None or options.halo is not None:
+            raise OptionError(
+                "`tile`: with `guide` or `pattern_size` frames are painted as wholes; leave it out"
+            )
+        return None
+    if options.tile is not None:
+        return Tiling(options.tile, options.halo)
+    given = memory_budget(options.memory_budget)
+    budget = given or free_memory() / 2
+    cells = max(smoke_cells(frame.path, options.smoke) for frame in sequence)
+    sizes = {"grid": roll.grid, "finer": roll.finer}
+    needed = bytes_needed(cells, **sizes)
+    if needed <= budget:
+        if options.halo is not None:
+            raise OptionError("`halo`: frames are painted as wholes here; give `tile`, too")
+        return None
+    tiling = Tiling(likely_edge(budget, **sizes), options.halo)
+    watch.note(
+        f"frames of {cells} cells would take about {needed / 1e9:.1f} GB; painting tiles of "
+        f"{tiling.edge} cells a side, to the same files"
+    )
+    return tiling
+
+
+def _paint(
+    painter: Painter, options: StylizeRun, watch: Watch, count: _Count
+) -> Iterator[Path | None]:
     """The files of the frames, painted to the end, or until `watch` or the caller ends it."""
     total, finished, first = len(painter.frames), 0, painter.chunk.first
+    count.total = total
     with ExitStack() as stack:
         film = _film(options, painter, stack, watch)
         unfinished = painter.begin(resume=options.resume, overwrite=options.overwrite)
@@ -251,6 +317,7 @@ def _paint(painter: Painter, options: StylizeRun, watch: Watch) -> Iterator[Path
                     if film is not None and path is not None:
                         film.add(read_painted(path, frame.path, options))
                     yield path
+                    count.done = finished
                     if finished > already:
                         watch.progress("painting", finished, total, "frames")
         except KeyboardInterrupt:

@@ -17,6 +17,7 @@ from vnca.core.errors import (
     OutOfMemoryError,
     VncaError,
 )
+from vnca.core.memory import memory_budget
 from vnca.features import FeatureNetwork
 from vnca.io.picture import resize, to_srgb8
 from vnca.recipe import PICTURE_CELLS, Watch, recorded, restored
@@ -25,7 +26,7 @@ from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
 from vnca.training.config import TrainingConfig
 from vnca.training.loop import Trainer
-from vnca.training.rollout import is_out_of_memory, memory_advice, memory_budget
+from vnca.training.rollout import is_out_of_memory, memory_advice
 from vnca.training.run import NoFolder, RunFolder, preview_sheet
 
 FINGERPRINTS = "fingerprints"

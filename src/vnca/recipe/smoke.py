@@ -10,6 +10,7 @@ from vnca.core import FloatArray
 from vnca.core.errors import GridError, OptionError
 from vnca.core.files import remove_file
 from vnca.core.lattice import Lattice
+from vnca.core.memory import memory_budget
 from vnca.core.records import distributed
 from vnca.core.volume import Volume
 from vnca.engine.tensors import choose_device, require_equal_runs
@@ -48,7 +49,6 @@ from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint, fingerprints
 from vnca.training.config import SmokeConfig, TextureConfig
 from vnca.training.presets import DEFAULT
 from vnca.training.presets import preset as preset_of
-from vnca.training.rollout import memory_budget
 from vnca.training.styles import shared_out, told_styles
 from vnca.training.terms import Term
 from vnca.training.trainers import smoke_trainer

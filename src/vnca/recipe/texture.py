@@ -16,6 +16,7 @@ import numpy as np
 from vnca.core import AnyArray, FloatArray
 from vnca.core.colour import linear_to_srgb
 from vnca.core.errors import OptionError
+from vnca.core.memory import memory_budget
 from vnca.core.records import distributed
 from vnca.engine.automaton import FILTERS
 from vnca.engine.tensors import choose_device, require_equal_runs
@@ -44,7 +45,6 @@ from vnca.training.config import SmokeConfig, TextureConfig
 from vnca.training.loop import Trainer
 from vnca.training.presets import DEFAULT
 from vnca.training.presets import preset as preset_of
-from vnca.training.rollout import memory_budget
 from vnca.training.styles import shared_out, told_styles
 from vnca.training.trainers import texture_trainer
 

@@ -8,12 +8,9 @@ Griewank 1992, "Achieving logarithmic growth of temporal and spatial complexity 
 differentiation"; one level of it.
 """
 
-import os
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil, inf, prod
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +19,7 @@ from torch import Tensor
 from torch.utils.checkpoint import checkpoint
 
 from vnca.core.errors import OptionError
+from vnca.core.memory import free_memory, used_memory
 from vnca.training import Snapshot, count, matched
 from vnca.training.config import PoolConfig, TrainingConfig
 from vnca.training.scenes import Scene
@@ -192,8 +190,6 @@ the two above: measured at 48³ and 64³ cells, together 390 to 630 bytes a cell
 MARGIN = 1.1
 """What was measured is at most so much more than what this foretells."""
 
-_UNITS = {"MB": 10**6, "GB": 10**9, "TB": 10**12, "MIB": 2**20, "GIB": 2**30, "TIB": 2**40}
-
 
 @dataclass(frozen=True)
 class MemoryNeeds:
@@ -283,26 +279,11 @@ def memory_advice(scene: Scene[Any], config: TrainingConfig, kept: float) -> str
     )
 
 
-def memory_budget(text: str) -> int | None:
-    """Bytes of a `--memory-budget`, such as 12GB or 800 MiB; None for `auto`.
-
-    Raises:
-        OptionError: If it is neither.
-    """
-    if text == "auto":
-        return None
-    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?([MGT]I?B)", text.upper())
-    if found is None:
-        raise OptionError(f"`memory_budget` {text}: expected auto, or a size such as 12GB or 800MB")
-    return round(float(found[1]) * _UNITS[found[2]])
-
-
 def memory_used(device: torch.device) -> int:
     """Bytes that this program has now, 0 where that cannot be known; on a GPU, those of tensors."""
     if device.type == "cuda":
         return torch.cuda.memory_allocated(device)
-    pages = _number(Path("/proc/self/statm"), r"\d+ (\d+)")
-    return 0 if pages is None else pages * os.sysconf("SC_PAGE_SIZE")
+    return used_memory()
 
 
 def memory_free(device: torch.device) -> float:
@@ -310,14 +291,7 @@ def memory_free(device: torch.device) -> float:
     if device.type == "cuda":
         kept_for_tensors = torch.cuda.memory_reserved(device) - torch.cuda.memory_allocated(device)
         return torch.cuda.mem_get_info(device)[0] + kept_for_tensors
-    available = _number(Path("/proc/meminfo"), r"MemAvailable:\s+(\d+) kB")
-    group = Path("/sys/fs/cgroup")  # what a container may have
-    limit, taken = (_number(group / f"memory.{name}", r"(\d+)") for name in ("max", "current"))
-    cached = _number(group / "memory.stat", r"inactive_file (\d+)") or 0
-    return min(
-        inf if available is None else available * 1024,
-        inf if limit is None or taken is None else limit - taken + cached,
-    )
+    return free_memory()
 
 
 def is_out_of_memory(error: BaseException) -> bool:
@@ -329,15 +303,6 @@ def is_out_of_memory(error: BaseException) -> bool:
             words in told for words in ("allocate memory", "not enough memory", "out of memory")
         )
     )
-
-
-def _number(path: Path, pattern: str) -> int | None:
-    """The number in a file of the Linux kernel's; None if there is none."""
-    try:
-        found = re.search(pattern, path.read_text())
-    except OSError:
-        return None
-    return int(found[1]) if found else None
 
 
 def _listed(needs: MemoryNeeds, config: TrainingConfig, kept: float) -> str:

@@ -16,6 +16,7 @@ from vnca.cli.demo import STYLE
 from vnca.cli.terminal import Terminal, say
 from vnca.core import FloatArray
 from vnca.core.errors import OptionError
+from vnca.core.memory import memory_budget
 from vnca.core.volume import Volume
 from vnca.engine.native import default_threads
 from vnca.engine.tensors import choose_device
@@ -27,7 +28,6 @@ from vnca.recipe.sequence import beside, read_alone
 from vnca.simulation import simulate
 from vnca.training.config import SmokeConfig
 from vnca.training.presets import DEFAULT, preset
-from vnca.training.rollout import memory_budget
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ from vnca.io.vdb.layout import (
     encode_string,
 )
 from vnca.io.vdb.metadata import Entry, Metadata, Transform, read_metadata
+from vnca.io.vdb.part import GridIndex
 from vnca.io.vdb.tree import Tiles, Tree
 
 _FLAGS = {
@@ -335,6 +336,7 @@ __all__ = [
     "Entry",
     "Grid",
     "GridHeader",
+    "GridIndex",
     "Metadata",
     "Tiles",
     "Transform",

@@ -85,16 +85,22 @@ class Codec:
         with np.errstate(invalid="ignore"):  # not-a-numbers are data here
             values[stored] = packed.reshape(-1, self.value_type.components)
 
-    def skip_leaves(self, cursor: Cursor, active: BoolArray) -> None:
+    def skip_leaves(self, cursor: Cursor, active: BoolArray) -> AnyArray:
         """Move the cursor behind the leaves whose masks are `active`; nothing is unpacked.
+
+        Returns:
+            The byte where each of them begins, `[n + 1]`, and where the last one ends.
 
         Raises:
             FileFormatError: If they are truncated or corrupt.
         """
+        positions = [cursor.position]
         for start in range(0, len(active), _BATCH):
             for _, _, count in self._nodes(cursor, active[start : start + _BATCH], is_leaf=True):
                 length, _ = self._chunk_length(cursor, self._stored_size(count))
                 cursor.seek(cursor.position + length)
+                positions.append(cursor.position)
+        return np.array(positions, np.int64)
 
     def _nodes(
         self, cursor: Cursor, active: BoolArray, is_leaf: bool

@@ -149,6 +149,11 @@ class Grid:
         Returns:
             Values in the grid's own type, zero where inactive, and which cells are active.
         """
+        _, counts = self._tile_spans(box)
+        fits = counts.prod(axis=1).sum() * LEAF_CELLS <= MOST_TILE_CELLS
+        return self._fields(box, None if fits else near)
+
+    def _fields(self, box: Box, near: IntArray | None) -> tuple[Field, Field]:
         tree, edges = self.tree, (LEAF_EDGE,) * 3
         leaves = tree.leaf_origins // LEAF_EDGE
         first, last = covered(leaves, box)
@@ -168,17 +173,23 @@ class Grid:
         shown = Field(bricks[order], values.reshape(-1, *edges, *kind), box).within(box)
         return shown, Field(bricks[order], active.reshape(-1, *edges), box, False).within(box)
 
-    def _tile_bricks(self, box: Box, near: IntArray | None) -> tuple[AnyArray, IntArray]:
-        """Bricks of active tiles in a box: of which tile `[n]`, and their coordinates `[n, 3]`."""
+    def _tile_spans(self, box: Box) -> tuple[AnyArray, AnyArray]:
+        """Where tiles begin in a box, and how many bricks they fill in it, `[n, 3]`, 0 if idle."""
         tiles = self.tree.tiles
         origins = tiles.origins.astype(np.int64)
         low = np.maximum(origins, box.lower) // LEAF_EDGE
         high = -(-np.minimum(origins + tiles.edges[:, None], box.upper) // LEAF_EDGE)
         counts = np.maximum(high - low, 0)
         counts[~tiles.active] = 0
+        return low, counts
+
+    def _tile_bricks(self, box: Box, near: IntArray | None) -> tuple[AnyArray, IntArray]:
+        """Bricks of active tiles in a box: of which tile `[n]`, and their coordinates `[n, 3]`."""
+        low, counts = self._tile_spans(box)
         found = np.flatnonzero(counts.all(axis=1))
-        if near is not None and counts[found].prod(axis=1).sum() * LEAF_CELLS > MOST_TILE_CELLS:
+        if near is not None:
             # Each of those bricks that lie in a tile.
+            high = low + counts
             at = [((near >= low[tile]) & (near < high[tile])).all(axis=1) for tile in found]
             bricks = [near[there] for there in at]
         else:
@@ -278,11 +289,45 @@ class Grid:
         grid_class: str | None = None,
     ) -> "Grid":
         """A grid with a leaf wherever cells are active; arguments and errors as of `from_dense`."""
-        value_type = _value_type_of(name, values.values)
         if any(abs(cell) > 2**31 for corner in active.box for cell in corner):
             raise GridError(
                 f"grid {name!r}: cells from {active.origin} leave the range of 32-bit indices"
             )
+        kind = values.values.shape[4:]
+        leaf_active = active.values.reshape(-1, LEAF_CELLS)
+        leaf_values = values.blocks(active.bricks).reshape(-1, LEAF_CELLS, *kind)
+        background = np.array(np.broadcast_to(np.asarray(background, leaf_values.dtype), kind))
+        leaf_values[~leaf_active] = background
+        return cls.from_leaves(
+            name,
+            Tree(
+                background,
+                active.bricks * np.int32(LEAF_EDGE),
+                leaf_active,
+                leaf_values,
+                Tiles.none(_value_type_of(name, leaf_values)),
+            ),
+            like=like,
+            transform=transform,
+            metadata=metadata,
+            half=half,
+            grid_class=grid_class,
+        )
+
+    @classmethod
+    def from_leaves(
+        cls,
+        name: str,
+        tree: Tree,
+        *,
+        like: Described | None = None,
+        transform: Transform | None = None,
+        metadata: Mapping[str, Any] | None = None,
+        half: bool | None = None,
+        grid_class: str | None = None,
+    ) -> "Grid":
+        """A grid with a tree of its own; arguments and errors as of `from_dense`."""
+        value_type = _value_type_of(name, tree.leaf_values)
         if transform is None:
             if like is None:
                 raise GridError(f"grid {name!r}: needs a transform, or a grid to be like")
@@ -295,13 +340,6 @@ class Grid:
             entries.update(Metadata.of({"class": grid_class}))
         if half is None:
             half = like.is_half if like is not None else False
-        dtype, kind = values.values.dtype, values.values.shape[4:]
-        background = np.array(np.broadcast_to(np.asarray(background, dtype), kind))
-        leaf_active = active.values.reshape(-1, LEAF_CELLS)
-        leaf_values = values.blocks(active.bricks).reshape(-1, LEAF_CELLS, *kind)
-        leaf_values[~leaf_active] = background
-        origins = active.bricks * np.int32(LEAF_EDGE)
-        tree = Tree(background, origins, leaf_active, leaf_values, Tiles.none(value_type))
         return cls(name, value_type.name, transform, tree, entries, half)
 
 
@@ -318,8 +356,8 @@ def _put_bricks(
 
 
 def _value_type_of(name: str, values: AnyArray) -> ValueType:
-    """The type of values in bricks, `[m, 8, 8, 8, ...]`."""
-    kind = values.shape[4:]
+    """The type of values of leaves, `[m, 512, ...]`."""
+    kind = values.shape[2:]
     components = {(): 1, (3,): 3}.get(kind)
     for value_type in VALUE_TYPES.values():
         if value_type.dtype == values.dtype and value_type.components == components:

@@ -6,7 +6,9 @@ Reference: OpenVDB `io/GridDescriptor.cc`, `io/Archive.cc` (`readGrid`), `io/Fil
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+
+import numpy as np
 
 from vnca.core import Box
 from vnca.core.errors import GridError
@@ -22,7 +24,8 @@ from vnca.io.vdb.layout import (
     ValueType,
 )
 from vnca.io.vdb.metadata import Metadata, Transform, read_metadata, read_transform
-from vnca.io.vdb.tree import Tree, locate_leaves, read_active, read_tree
+from vnca.io.vdb.part import GridIndex
+from vnca.io.vdb.tree import Leaves, Tree, locate_leaves, read_active, read_tree
 
 _TREE_NAME = "Tree_{}_" + "_".join(map(str, TREE))
 
@@ -161,8 +164,8 @@ class GridHeader:
             return self
         cursor = self.source.cursor(self.tree_start, limit, self.name)
         value_type = VALUE_TYPES[self.value_type]
-        blocks = locate_leaves(cursor, value_type, is_half=self.is_half, flags=self.compression)
-        return replace(self, blocks=blocks, end=cursor.position)
+        leaves = locate_leaves(cursor, value_type, is_half=self.is_half, flags=self.compression)
+        return replace(self, blocks=leaves.begin, end=cursor.position)
 
     @property
     def transform(self) -> Transform:
@@ -196,36 +199,54 @@ class GridHeader:
             FileFormatError: If it is truncated, corrupt or of an unsupported kind.
             GridError: If the file has been closed or the transform is not linear.
         """
-        tree, value_type, cursor = self._tree(read_tree)
-        if cursor.remaining:
-            raise cursor.error(f"corrupt: {cursor.remaining} bytes follow the last leaf")
-        name = decoded(self.grid_name)
-        return Grid(name, value_type.name, self.transform, tree, self.metadata, self.is_half)
+        return self._grid(read_tree)
 
     def read_active(self) -> Grid:
         """Which cells are active, as a grid of booleans; quick, as no values are read.
 
         The errors are those of `read`.
         """
-        tree, _, _ = self._tree(read_active)
-        return Grid(decoded(self.grid_name), "bool", self.transform, tree, self.metadata)
+        grid = self._grid(read_active, to_the_end=False)
+        grid.value_type, grid.is_half = "bool", False
+        return grid
 
-    def _tree(self, read: Callable[..., Tree]) -> tuple[Tree, ValueType, Cursor]:
-        """What a function of `vdb/tree.py` reads, of which type, and the cursor behind it."""
+    def indexed(self) -> GridIndex:
+        """The same with the values of no leaf: those of a part can be read then.
+
+        Raises:
+            FileFormatError: As of `read`, but for what is wrong with values.
+            GridError: As of `read`.
+        """
+        leaves: list[Leaves] = []
+
+        def located(cursor: Cursor, value_type: ValueType, **options: Any) -> Tree:
+            leaves.append(locate_leaves(cursor, value_type, **options))
+            return leaves[0].tree(self._cursor, np.empty(0, np.int64))
+
+        return GridIndex(self._grid(located), leaves[0], self._cursor)
+
+    def _cursor(self, begin: int) -> Cursor:
         owner = self.parent or self
         end = self.source.size if owner.end is None else owner.end
-        cursor = self.source.cursor(owner.tree_start or 0, end, self.name)
+        return self.source.cursor(begin, end, self.name)
+
+    def _grid(self, read: Callable[..., Tree], *, to_the_end: bool = True) -> Grid:
+        owner = self.parent or self
+        cursor = self._cursor(owner.tree_start or 0)
         if (value_type := VALUE_TYPES.get(self.value_type)) is None:
             raise cursor.error(
                 f"cannot read values of type {self.value_type}, only {', '.join(VALUE_TYPES)}"
             )
-        _ = self.transform  # or an error says why there is none
+        transform = self.transform
         if owner.tree_start is None:
             raise cursor.error(f"its tree lies behind a {owner.map_type} of unknown length")
         if owner.compression > _ALL_FLAGS:
             raise cursor.error(f"unknown compression {int(owner.compression)}")
         tree = read(cursor, value_type, is_half=self.is_half, flags=owner.compression)
-        return tree, value_type, cursor
+        if to_the_end and cursor.remaining:
+            raise cursor.error(f"corrupt: {cursor.remaining} bytes follow the last leaf")
+        name = decoded(self.grid_name)
+        return Grid(name, value_type.name, transform, tree, self.metadata, self.is_half)
 
 
 _ALL_FLAGS = Compression.ZIP | Compression.ACTIVE_MASK | Compression.BLOSC

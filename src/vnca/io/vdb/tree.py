@@ -4,6 +4,7 @@ Reference: OpenVDB `tree/Tree.h`, `tree/RootNode.h`, `tree/InternalNode.h`, `tre
 `tree/LeafNodeBool.h` (`readTopology`, `readBuffers`).
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -107,6 +108,9 @@ class _Topology:
         active = bits_of(b"".join(self.leaf_masks)).reshape(-1, LEAF_CELLS)
         return np.concatenate(self.leaf_origins), active
 
+    def all_tiles(self) -> Tiles:
+        return Tiles(*(np.concatenate(parts) for parts in zip(*self.tiles, strict=True)))
+
     def _check_root_origins(self, origins: AnyArray) -> None:
         if (origins % UPPER_EDGE).any():
             raise self.cursor.error("corrupt: a node below the root is not on a multiple of 4096")
@@ -150,10 +154,55 @@ def read_tree(cursor: Cursor, value_type: ValueType, *, is_half: bool, flags: Co
         values = _read_bool_leaves(cursor, origins, active)
     else:
         values = codec.read_values(cursor, active, is_leaf=True)
-    tiles = Tiles(*(np.concatenate(parts) for parts in zip(*topology.tiles, strict=True)))
-    return Tree(
-        value_type.shaped(codec.background), origins, active, value_type.shaped(values), tiles
-    )
+    background = value_type.shaped(codec.background)
+    return Tree(background, origins, active, value_type.shaped(values), topology.all_tiles())
+
+
+class Leaves(NamedTuple):
+    """All of a tree but the values of its leaves, and where those are: any of them can be read.
+
+    Attributes:
+        begin: Byte where the values of the leaves begin.
+        positions: Byte where those of each leaf begin, `[n + 1]`, and where the tree ends.
+        origins: Lowest cell of each leaf, `[n, 3]`.
+        active: `[n, 512]`, z fastest.
+        tiles: Cubes of one value.
+        codec: How values are stored.
+    """
+
+    begin: int
+    positions: AnyArray
+    origins: IntArray
+    active: BoolArray
+    tiles: Tiles
+    codec: Codec
+
+    def tree(self, cursor_at: Callable[[int], Cursor], chosen: AnyArray) -> Tree:
+        """The tree with some of its leaves alone.
+
+        Args:
+            cursor_at: A cursor at a byte of the file.
+            chosen: `[m]` numbers of leaves, ascending.
+
+        Raises:
+            FileFormatError: If a leaf is corrupt.
+        """
+        value_type, kind = self.codec.value_type, (LEAF_CELLS, self.codec.value_type.components)
+        values = np.empty((len(chosen), *kind), value_type.dtype)
+        done = 0
+        for run in np.split(chosen, np.flatnonzero(np.diff(chosen) != 1) + 1):
+            if not len(run):
+                continue
+            cursor, active = cursor_at(int(self.positions[run[0]])), self.active[run]
+            values[done : done + len(run)] = (
+                _read_bool_leaves(cursor, self.origins[run], active)
+                if value_type.name == "bool"
+                else self.codec.read_values(cursor, active, is_leaf=True)
+            )
+            done += len(run)
+        background = value_type.shaped(self.codec.background)
+        origins, active = self.origins[chosen], self.active[chosen]
+        return Tree(background, origins, active, value_type.shaped(values), self.tiles)
 
 
 def read_active(
@@ -165,14 +214,14 @@ def read_active(
     """
     topology = _read_topology(cursor, value_type, is_half, flags)
     origins, active = topology.leaves()
-    tiles = Tiles(*(np.concatenate(parts) for parts in zip(*topology.tiles, strict=True)))
+    tiles = topology.all_tiles()
     return Tree(np.zeros((), bool), origins, active, active, tiles._replace(values=tiles.active))
 
 
 def locate_leaves(
     cursor: Cursor, value_type: ValueType, *, is_half: bool, flags: Compression
-) -> int:
-    """Where the values of the leaves begin; the cursor moves behind the tree.
+) -> Leaves:
+    """What a tree holds and where the values of its leaves are; the cursor moves behind the tree.
 
     The arguments and errors are those of `read_tree`; values of leaves are not unpacked.
     """
@@ -181,9 +230,10 @@ def locate_leaves(
     begin = cursor.position
     if value_type.name == "bool":
         _read_bool_leaves(cursor, origins, active)
+        positions = begin + BOOL_LEAF.itemsize * np.arange(len(origins) + 1)
     else:
-        topology.codec.skip_leaves(cursor, active)
-    return begin
+        positions = topology.codec.skip_leaves(cursor, active)
+    return Leaves(begin, positions, origins, active, topology.all_tiles(), topology.codec)
 
 
 def _read_topology(

@@ -2,41 +2,30 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from vnca.core import AnyArray, Box, FloatArray
+from vnca.core import Box, FloatArray
 from vnca.core.errors import GridError, OptionError, OutputError, ShapeError
-from vnca.core.field import Field, dilated, divided
+from vnca.core.field import Field
 from vnca.core.lattice import Lattice, Placement
-from vnca.core.volume import Volume, refined_transform
+from vnca.core.volume import Volume
+from vnca.io.painted.cells import PaintedCells, finer, with_rim
 from vnca.io.provenance import Provenance, without_provenance
 from vnca.io.smoke_format import (
     CELLS_PER_FRAME,
     UNITS_METADATA,
     SmokeFormat,
-    UpAxis,
-    on_lattice,
     own_cells,
     reader_of,
     up_axis_of,
     upright_world,
 )
-from vnca.io.vdb import (
-    VALUE_TYPES,
-    Entry,
-    Grid,
-    GridHeader,
-    Transform,
-    VdbFile,
-    open_vdb,
-    write_vdb,
-)
+from vnca.io.vdb import Entry, Grid, GridHeader, Transform, VdbFile, open_vdb, write_vdb
 from vnca.io.vdb.header import decoded
 from vnca.io.vdb_smoke import read_density
-from vnca.io.velocity import extrapolated
 
 COLOUR_GRIDS = ("Cd",)
 EMISSION = "emission"
@@ -46,7 +35,6 @@ EMISSION = "emission"
 _SHARED_METADATA = ("class", "is_local_space")
 # Blender's, of the cells of a grid: not true of finer ones.
 _METADATA_OF_CELLS = ("file_base_resolution", "file_voxel_size")
-_HALF_MOST = float(np.finfo(np.float16).max)
 
 
 def write_painted(
@@ -116,7 +104,7 @@ def write_painted(
     colours: dict[str, Field] = dict.fromkeys(colour_grids, colour)
     if emission is not None:
         colours[EMISSION] = emission
-    frame = _Painting(density, colours, lattice, up_axis_of(source, format), refine, beyond)
+    frame = PaintedCells(density, colours, lattice, up_axis_of(source, format), refine, beyond)
     told = provenance.metadata if provenance else {}
     if source.suffix.lower() != ".vdb":
         _paint_other(path, source, format, frame, told)
@@ -190,107 +178,11 @@ def read_colour(
     return values.dense(box)
 
 
-@dataclass(frozen=True, eq=False)
-class _Painting:
-    """What was painted, and where its cells lie.
-
-    Attributes:
-        density: Of cells `refine` times as fine as those of the lattice.
-        colours: Of the same cells, each under the name that it gets.
-        lattice: None for those of the source, along our axes.
-        up: Which axis of the source's world points up.
-        refine: How fine they are.
-        beyond: How many cells around those of the source there may be smoke.
-    """
-
-    density: Field
-    colours: Mapping[str, Field]
-    lattice: Lattice | None
-    up: UpAxis
-    refine: int
-    beyond: int
-
-    def in_file(
-        self, transform: Transform, density: Field, what: str
-    ) -> tuple[Field, dict[str, Field]]:
-        """Density and colours of the file's cells, or as fine ones.
-
-        Args:
-            transform: Of the file's cells.
-            density: Theirs before they were painted, as the file has it.
-            what: What a message calls them.
-
-        Raises:
-            ShapeError: If some of them were not painted.
-        """
-        world, cells = upright_world(transform.index_to_world, self.up), density.box
-        ours = own_cells(world, what)[1]
-        if self.lattice is not None and not cells.is_empty:
-            ours = self.lattice.to_world
-        needed = Placement.between(world, ours, cells, what).box(cells).refined(self.refine)
-        painted = self.density.box
-        if painted.union(needed) != painted:
-            raise ShapeError(f"{what}: smoke in {needed}, but only {painted} was painted")
-        over = cells.refined(self.refine)
-        if not over.is_empty:
-            over = over.grown(self.beyond)
-        source, target = (refined_transform(matrix, self.refine) for matrix in (world, ours))
-        back = Placement.between(source, target, over, what).inverse
-        # Of a colour that has several names there is one field.
-        named = {id(colour): colour for colour in self.colours.values()}
-        moved = {key: back.field(colour, over, "nearest") for key, colour in named.items()}
-        colours = {name: moved[id(colour)] for name, colour in self.colours.items()}
-        if back.is_whole or self.beyond:
-            return back.field(self.density, over), colours
-        positive = np.maximum(density.values.astype(np.float32), 0)
-        plain = Volume.of_fields(replace(density, values=positive), None, world, 0)
-        change = self._change(on_lattice(plain, Lattice(ours), what).refined(self.refine))
-        # Of what is nothing everywhere, nothing comes of interpolation.
-        change = back.field(change, over, "nearest")
-        finer = plain.refined(self.refine).density_field
-        return replace(finer, values=finer.values * (1 + change.blocks(finer.bricks))), colours
-
-    def active(self, density: Field, of_file: Field, background: AnyArray | float = 0) -> Field:
-        """Which cells to store; `of_file` are active in the file."""
-        if self.refine == 1 and not self.beyond:
-            return of_file
-        dense = replace(density, values=density.values != 0, outside=False).trimmed()
-        # A cell that is not stored would not be empty.
-        keeps = background or self.refine == 1
-        return dense.union(divided(of_file, self.refine)) if keeps else dense
-
-    def transform(self, of_file: Transform) -> Transform:
-        """That of the painted cells; `of_file` is that of the file's."""
-        if self.refine == 1:
-            return of_file
-        return Transform.from_matrix(refined_transform(of_file.index_to_world, self.refine))
-
-    def _change(self, plain: Volume) -> Field:
-        """What the painting multiplied the density by, less 1; 0 where there was none."""
-        before = plain.density_field
-        factor, painted = np.ones_like(before.values), self.density.blocks(before.bricks)
-        np.divide(painted, before.values, out=factor, where=before.values > 0)
-        return Field(before.bricks, factor - 1, self.density.box)
-
-
-def _with_rim(colours: Mapping[str, Field], active: Field) -> tuple[dict[str, Field], Field]:
-    """Colours that go on for a cell around the smoke, and the cells that have one.
-
-    Renderers interpolate density and colour one by one: beside black, the border of opaque smoke
-    would be dark.
-    """
-    box = active.box.grown(1)
-    active = replace(active, box=box)
-    # A cell at a corner is three steps away.
-    wide = {n: extrapolated(replace(c, box=box), active, 3)[0] for n, c in colours.items()}
-    return wide, dilated(active, 1)
-
-
 def _paint_vdb(
     path: Path,
     file: VdbFile,
     format: SmokeFormat,
-    frame: _Painting,
+    frame: PaintedCells,
     told: Mapping[str, Entry],
 ) -> None:
     about = {**without_provenance(file.metadata), **told}
@@ -298,50 +190,51 @@ def _paint_vdb(
         write_vdb(path, [], metadata=about)
         return
     header, old, cells = read_density(file, format)
-    what = f"{file.path}: grid {header.name!r}"
-    before, active = old.fields(cells)
-    density, colours = frame.in_file(old.transform, before, what)
+    transform = finer(old.transform, frame.refine)
+    density, colours = frame.stored(old, *old.fields(cells), f"{file.path}: grid {header.name!r}")
     background = old.tree.background
-    active = frame.active(density, active, background)
-    colours, coloured = _with_rim(colours, active)
-    transform = frame.transform(old.transform)
-    dtype = VALUE_TYPES[old.value_type].dtype
-    if dtype.kind != "f":
-        dtype = np.dtype(np.float32)
-    if old.is_half or dtype.itemsize == 2:
-        density = _as_half(density)
-        colours = {name: _as_half(colour) for name, colour in colours.items()}
-    density = replace(density, values=density.values.astype(dtype))
-    new = Grid.from_fields(
-        old.name, density, active, like=old, transform=transform, background=background
-    )
-    for name in _METADATA_OF_CELLS if frame.refine > 1 else ():
-        new.metadata.pop(name, None)
-    grids: list[Grid | GridHeader] = [
-        new if name == header.name else other
-        for name, other in file.grids.items()
-        if name == header.name or decoded(other.grid_name) not in colours
-    ]
-    shared = {name: old.metadata[name] for name in _SHARED_METADATA if name in old.metadata}
-    grids += [
-        Grid.from_fields(
-            name, colour, coloured, transform=transform, metadata=shared, half=old.is_half
-        )
+    new = Grid.from_fields(old.name, *density, like=old, transform=transform, background=background)
+    shared = shared_metadata(old)
+    made = [
+        Grid.from_fields(name, *colour, transform=transform, metadata=shared, half=old.is_half)
         for name, colour in colours.items()
     ]
-    write_vdb(path, grids, metadata=about)
+    write_vdb(path, among(file, header, new, made, refine=frame.refine), metadata=about)
 
 
-def _as_half(field: Field) -> Field:
-    """Values that a half float can hold."""
-    return replace(field, values=np.clip(field.values, -_HALF_MOST, _HALF_MOST))
+def among(
+    file: VdbFile, header: GridHeader, density: Grid, colours: Sequence[Grid], *, refine: int
+) -> list[Grid | GridHeader]:
+    """The grids of a painted file: those of its source, with new ones in their places.
+
+    Args:
+        file: The source.
+        header: Its density.
+        density: What takes that one's place.
+        colours: What else is new.
+        refine: How many times as fine the new ones are.
+    """
+    for name in _METADATA_OF_CELLS if refine > 1 else ():
+        density.metadata.pop(name, None)
+    names = {grid.name for grid in colours}
+    kept: list[Grid | GridHeader] = [
+        density if name == header.name else other
+        for name, other in file.grids.items()
+        if name == header.name or decoded(other.grid_name) not in names
+    ]
+    return [*kept, *colours]
+
+
+def shared_metadata(density: Grid) -> Mapping[str, Entry]:
+    """Of a density, what holds for a colour on its cells as well."""
+    return {n: density.metadata[n] for n in _SHARED_METADATA if n in density.metadata}
 
 
 def _paint_other(
     path: str | Path,
     source: str | Path,
     format: SmokeFormat,
-    frame: _Painting,
+    frame: PaintedCells,
     told: Mapping[str, Entry],
 ) -> None:
     stored = reader_of(Path(source)).read(Path(source), format)
@@ -349,13 +242,13 @@ def _paint_other(
     before = stored.density
     density, colours = frame.in_file(transform, before, str(source))
     active = frame.active(density, replace(before, values=before.values != 0, outside=False))
-    colours, coloured = _with_rim(colours, active)
+    colours, coloured = with_rim(colours, active)
     grids = [
         Grid.from_fields(
             name,
             values,
             stored,
-            transform=frame.transform(transform),
+            transform=finer(transform, frame.refine),
             grid_class="fog volume",
         )
         for name, values, stored in [

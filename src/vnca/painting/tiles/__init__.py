@@ -1,0 +1,55 @@
+"""Painting sequences whose frames are larger than memory: tile by tile, to the same files."""
+
+from dataclasses import dataclass
+
+from vnca.core.bricks import EDGE
+from vnca.core.errors import OptionError
+
+EDGES = (768, 512, 384, 256, 192, 128, 96, 64, 48, 32)
+"""Cells along a side of the tiles that are chosen from, the largest first."""
+_LIKELY_HALO = 12
+_CELL, _PAINTED_CELL, _REST = 350, 130, 400_000_000
+
+
+@dataclass(frozen=True)
+class Tiling:
+    """How frames are cut.
+
+    Attributes:
+        edge: Cells of the automaton along an edge of a tile, a multiple of 8.
+        halo: Cells around it that it is given; chosen by cost if None.
+    """
+
+    edge: int
+    halo: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.edge < EDGE or self.edge % EDGE:
+            raise OptionError(f"`tile` {self.edge}: expected a multiple of {EDGE}")
+        if self.halo is not None and self.halo < 1:
+            raise OptionError(f"`halo` {self.halo}: at least 1 is needed")
+
+
+def bytes_needed(cells: int, *, grid: int, finer: int) -> int:
+    """About what it takes to paint so many cells of smoke at a time.
+
+    Args:
+        cells: As they are in the file.
+        grid: How many times as fine the automaton's are,
+        finer: and how many times as fine as those the painting's.
+    """
+    return cells * grid**3 * (_CELL + _PAINTED_CELL * finer**3) + _REST
+
+
+def likely_edge(budget: float, *, grid: int, finer: int) -> int:
+    """The largest tiles that fit a memory even where all of one is smoke.
+
+    Raises:
+        OptionError: If none do.
+    """
+    for edge in EDGES:
+        wide = edge + 2 * _LIKELY_HALO
+        if bytes_needed(wide**3, grid=1, finer=finer) <= budget:
+            return edge
+    least = bytes_needed((EDGES[-1] + 2 * _LIKELY_HALO) ** 3, grid=1, finer=finer)
+    raise OptionError(f"`memory_budget`: at least {least / 1e9:.1f}GB are needed here")
