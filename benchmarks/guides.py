@@ -15,9 +15,11 @@ import numpy as np
 
 from vnca.core import AnyArray
 from vnca.core.camera import view_axes
-from vnca.direction import Inputs, Moment
+from vnca.core.volume import Volume
+from vnca.direction import Direction, Inputs, Moment
 from vnca.direction.grammar import parsed_guide
 from vnca.direction.guides import inwards, unit
+from vnca.direction.values import Value
 from vnca.features.strokes import distance_inside, structure_tensor
 from vnca.io import SmokeFormat, read_smoke
 from vnca.io.painted import read_colour
@@ -45,9 +47,7 @@ def main(smoke: str, painted: str, text: str, *numbers: str) -> None:
     for number in map(int, numbers):
         volume = read_smoke(frames[number], frame=number)
         moment = Moment(volume, volume.box, 0.01, inputs=Inputs({number: frames[number]}))
-        guide_parts = [part for part in guide.parts() if hasattr(part, "require")]
-        for part in guide_parts:
-            part.require(moment.inputs)  # pyright: ignore[reportAttributeAccessIssue]
+        Direction(guide=text).require(moment.inputs)
         for view in VIEWS:
             found = angles(moment, guide, files[number], view)
             sums += found
@@ -60,7 +60,7 @@ def means(sums: AnyArray) -> list[str]:
     return [f"{total / weight:.1f}" for total, weight in sums]
 
 
-def angles(moment: Moment, guide: AnyArray, path: Path, view: Viewpoint) -> AnyArray:
+def angles(moment: Moment, guide: Value, path: Path, view: Viewpoint) -> AnyArray:
     """The sum of angles in a view, weighed, and that of the weights, for each blur."""
     shown, told = read_smoke(path, PLAIN), read_provenance(path)
     colour = read_colour(path, PLAIN, grid="Cd", box=shown.box)
@@ -93,9 +93,7 @@ def angles(moment: Moment, guide: AnyArray, path: Path, view: Viewpoint) -> AnyA
     return np.array(found)
 
 
-def _doubled(
-    moment: Moment, guide: AnyArray, shown: AnyArray, refine: int, view: Viewpoint
-) -> AnyArray:
+def _doubled(moment: Moment, guide: Value, shown: Volume, refine: int, view: Viewpoint) -> AnyArray:
     """The cosine and sine of twice the angle of the guide in a view, cell by cell, as a colour.
 
     As long as the square of what of it lies in the picture; as strokes have no sign.
@@ -103,7 +101,7 @@ def _doubled(
     cells = np.argwhere(shown.density > 0) + shown.origin
     places = (cells + 0.5) / refine - 0.5
     places = np.rint(places).astype(np.int32)
-    along, normal = unit(guide.at(moment, places)), unit(inwards(moment, places))
+    along, normal = unit(np.asarray(guide.at(moment, places))), unit(inwards(moment, places))
     along = along - (along * normal).sum(1, keepdims=True) * normal
     right, up, _ = view_axes(*view)
     x, y = along @ right, along @ up
