@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from vnca.core.errors import OptionError
+from vnca.core.memory import memory_budget
 from vnca.core.volume import Volume
 from vnca.rule import Rule, Scales
 from vnca.training.config import PoolConfig, SmokeConfig, ViewConfig
@@ -14,7 +15,6 @@ from vnca.training.rollout import (
     fewest_kept,
     is_out_of_memory,
     memory_advice,
-    memory_budget,
     memory_free,
     memory_needs,
     memory_used,

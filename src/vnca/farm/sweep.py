@@ -11,6 +11,7 @@ from typing import Any
 
 from vnca.core.errors import FileFormatError, OptionError
 from vnca.core.files import existing_file, whole_file, writable_folder
+from vnca.core.memory import memory_budget as budget_of
 from vnca.core.records import require_known, with_values
 from vnca.direction.shot import Shot
 from vnca.farm.job import Job, Task
@@ -19,7 +20,6 @@ from vnca.io import SmokeFormat
 from vnca.recipe import Watch, recorded, smoke
 from vnca.training.config import SmokeConfig
 from vnca.training.presets import DEFAULT, preset
-from vnca.training.rollout import memory_budget as budget_of
 
 ASKED = "asked.json"
 """In the folder of a run: what its table asked of it."""
