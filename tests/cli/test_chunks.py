@@ -218,7 +218,7 @@ def test_a_chunk_that_is_killed_at_any_moment_goes_on_to_the_same_bytes(
         process = _chunk(chunks, out)
         time.sleep(lasts * moments.uniform(0.2, 1))
         process.send_signal(signal.SIGKILL)
-        process.wait()
+        process.communicate()
         _finished(_chunk(chunks, out))
         assert files_of(out) == files_of(tmp_path / "whole")
         assert (out / "state").read_bytes() == (tmp_path / "whole" / "state").read_bytes()

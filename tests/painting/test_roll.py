@@ -50,7 +50,12 @@ def computed_by(step: Callable[..., FloatArray]) -> Iterator[None]:
 
 
 def _session(
-    step: Callable[..., FloatArray], automaton: Automaton, domain: Domain, told: Any, *_: object
+    step: Callable[..., FloatArray],
+    automaton: Automaton,
+    domain: Domain,
+    told: Any,
+    *_: object,
+    **__: object,
 ) -> Session:
     job = Job(automaton, domain, told, Compute(), differentiable=False)
     return StepSession.open(job, draw=_draw, update=step)

@@ -67,6 +67,10 @@ COMMON: Mapping[str, tuple[str, ...]] = {
     ),
     "view": ("frames", "export", "page-fps", "browser", "port", *_SMOKE),
     "farm": ("out", "chunk-size", "handover", "styles", "seeds", "program", "env", "retries"),
+    "plan": (
+        *("model", "style", "frames", "refine", "machines", "chunk-size", "preroll", "tile"),
+        *("halo", "again", "json"),
+    ),
     "bench step": ("backends", "threads", "json", "csv"),
     "bench train": ("preset", "backends", "device", "threads", "repeats", "json", "csv"),
     "bench paint": ("grid", "occupancy", "precisions", "device", "threads", "json", "csv"),
