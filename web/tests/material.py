@@ -21,7 +21,8 @@ from vnca.recipe.sequence import region_bounds, region_of
 from vnca.recipe.simulation import simulate
 from vnca.recipe.viewing import ViewRun, run
 from vnca.rule.conditioning import Conditioning, register_conditioning
-from vnca.rule.model import CONFIG_NAME, MODEL_NAME, Model, load_style
+from vnca.rule.library import load_style
+from vnca.rule.model import CONFIG_NAME, MODEL_NAME, Model
 from vnca.training.run import Curves
 from vnca.viewer import SMOKE_NAME
 from vnca.viewer.smoke_file import MAGIC, SmokeFile, write_smoke_file

@@ -25,20 +25,13 @@ from vnca.direction.values import Constant
 from vnca.engine import Compute, Session, open_session
 from vnca.engine.domain import Domain, DomainKind
 from vnca.io.smoke_format import on_one_lattice
+from vnca.painting.parts import parts_of
 from vnca.painting.shown import COLOUR_DILATION, Painting, composed
 from vnca.painting.state import Ready, RollState
 from vnca.painting.transport import transported
 from vnca.rule import SMOKE_THRESHOLD, Rule
 from vnca.rule.conditioning import in_shares, priors
 from vnca.rule.mixing import blended
-from vnca.rule.paint import (
-    Between,
-    colour_means,
-    colours,
-    density_factors,
-    density_means,
-    parts_of_cells,
-)
 
 
 @dataclass(frozen=True)
@@ -331,29 +324,12 @@ class Roll:
         return Painting.of_fields(smoke, density, colour, state, moment.smoke, light)
 
     def _parts(self, ready: Ready, state: RollState, moment: Moment) -> Parts:
-        """What is painted by this rule alone.
+        """What is painted by this rule alone."""
 
-        Of a decoder, each is the mean over a part of a cell: what is finer than the grid of the
-        painting would be grain on it.
-        """
-        if self.rule.decoder is None:
-            cells = state.values[:-1]
-            strength = self.config.value("density_strength", moment, state.cells)
-            factors = density_factors(cells, strength=strength)
-            return Parts(state.cells, colours(cells), factors)
-        domain = ready.domain
-        between = Between(ready.rule, self.compute.backend, threads=self.compute.threads)
-        parts = self.finer
-        offsets = np.indices(3 * (parts,), np.int32).reshape(3, -1).T
-        at = (state.cells[:, None] * parts + offsets).reshape(-1, 3)
-        at = at.astype(np.int32, copy=False)
-        strength = self.config.value("density_strength", moment, self._places(at))
-        colour = np.empty((len(domain), *3 * (parts,), 3), np.float32)
-        factors = np.empty(colour.shape[:-1], np.float32)
-        for some, seen in parts_of_cells(between, state.values, domain, parts):
-            colour[some] = colour_means(seen)
-            factors[some] = density_means(seen, strength=_of_cells(strength, some, parts))
-        return Parts(at, colour.reshape(-1, 3), factors.reshape(-1))
+        def strength(at: AnyArray) -> Answer:
+            return self.config.value("density_strength", moment, self._places(at))
+
+        return parts_of(state, ready, self.finer, strength, self.compute)
 
     @property
     def reached(self) -> Box:
@@ -386,13 +362,6 @@ def with_rest(session: Session, values: Any, number: int, *, rest: AnyArray) -> 
     after = session.read(session.run(values, range(number, number + 1))).copy()
     after[:-1][rest] = before[:-1][rest]
     return session.upload(after)
-
-
-def _of_cells(answer: Answer, some: slice, parts: int) -> Any:
-    """An answer for all parts of cells, in some of the cells, beside the points in each part."""
-    if isinstance(answer, (int, float)):
-        return answer
-    return answer.reshape(-1, *3 * (parts, 1))[some]
 
 
 def painted(frames: Iterable[Volume], roll: Roll) -> Iterator[Painting]:

@@ -20,7 +20,7 @@ from vnca.core.errors import (
 )
 from vnca.core.files import existing_file, remove_file, remove_leftovers
 from vnca.core.lattice import Lattice
-from vnca.core.volume import Volume, length_of_cells, refined_transform
+from vnca.core.volume import length_of_cells, refined_transform
 from vnca.io import SmokeFormat, open_source, read_smoke, write_painted
 from vnca.io.provenance import Provenance, read_provenance
 from vnca.io.sequence import Frame, FrameSequence
@@ -29,6 +29,7 @@ from vnca.io.vdb import VdbFile
 from vnca.painting import Ready, Roll
 from vnca.painting.chunk import WHOLE, Chunk
 from vnca.painting.frames import VelocityCheck, read_ahead
+from vnca.painting.read import Read, close
 from vnca.painting.unfinished import Source, Unfinished
 
 OnError = Literal["stop", "skip", "hold"]
@@ -38,51 +39,6 @@ MARK = "painting"
 """Entry of a painted file that tells frames of one painting from those of others."""
 _SAVING_SHARE = 0.02
 """Share of the time that may go into keeping the state."""
-
-
-@dataclass(eq=False)
-class Read:
-    """A frame to be painted, and where it is from.
-
-    Attributes:
-        source: What it is from.
-        frame: Which one it is.
-        smoke: As fine as it is painted; or of which parts can be had.
-        file: Stays open for writing.
-        ready: The same made ready, until that is taken.
-    """
-
-    source: Source
-    frame: Frame
-    smoke: Any
-    file: VdbFile | None
-    ready: Ready | None
-
-    def take(self) -> Volume | Ready:
-        """The frame, made ready the first time: what that takes is not kept while it is written."""
-        ready, self.ready = self.ready, None
-        return ready or self.smoke
-
-    def require_unchanged(self) -> None:
-        """Refuse to copy from a file that was written to since it was read.
-
-        Raises:
-            FileFormatError: If it was.
-        """
-        if self.file is not None:
-            status = self.file.status
-            if (status.st_size, status.st_mtime_ns) != self.source[1:]:
-                raise FileFormatError(f"{self.frame.path}: has changed while it was painted")
-
-    def close(self) -> None:
-        """Close the file."""
-        if self.file is not None:
-            self.file.close()
-
-
-def _close(read: Read | VncaError | None) -> None:
-    if isinstance(read, Read):
-        read.close()
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +178,7 @@ class Painter:
         saved, due, start = len(sources), 0.0, len(sources)
         stop, first = self.chunk.first + len(self.frames), self.chunk.first
         loads = (partial(self._read, at) for at in range(start, stop))
-        reads = read_ahead(loads, unwanted=_close)
+        reads = read_ahead(loads, unwanted=close)
         held = self._held(sources)
         try:
             for frame, source in zip(self.frames, sources[first:], strict=False):
@@ -233,9 +189,9 @@ class Painter:
                     before, (held, state, source) = held, self._finish(frame, read, held, left)
                 finally:
                     if held is not read:
-                        _close(read)
+                        close(read)
                 if held is not before:
-                    _close(before)
+                    close(before)
                 sources.append(source)
                 if time.monotonic() >= due:
                     begun = time.monotonic()
@@ -248,7 +204,7 @@ class Painter:
                 Unfinished(self.conditions, tuple(sources), state).save(self.chunk.state_out)
         finally:
             reads.close()
-            _close(held)
+            close(held)
             if len(sources) > saved:
                 with suppress(OutputError):
                     Unfinished(self.conditions, tuple(sources), state).save(self.unfinished_path)

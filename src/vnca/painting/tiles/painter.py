@@ -17,7 +17,8 @@ from vnca.io.provenance import Provenance
 from vnca.io.sequence import Frame
 from vnca.io.vdb import VdbFile
 from vnca.painting import Ready
-from vnca.painting.painter import Painter, Read
+from vnca.painting.painter import Painter
+from vnca.painting.read import Read
 from vnca.painting.tiles import Tiling
 from vnca.painting.tiles.roll import TiledRoll
 from vnca.painting.tiles.state import TiledState
