@@ -533,7 +533,7 @@ test("what is bound in parts is painted and drawn the same to the bit", { timeou
   // Two rules on one frame, mixed by a brush; and what carries a rule along, which binds more arrays.
   const cases = [
     [24_000, mixedByBrush, ["places", "state", "words", "painted", "brushed"]],
-    [28_000, carriedAlong, ["places", "state", "painted", "brushed"]],
+    [36_000, carriedAlong, ["places", "state", "painted", "brushed"]],
   ];
   const whole = await seen("", ...cases.map(([, ask]) => ask));
   for (const [k, [bytes, ask, divided]] of cases.entries()) {
