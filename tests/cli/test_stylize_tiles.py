@@ -52,6 +52,13 @@ def test_files_of_tiles_are_those_of_wholes(paint: Any, options: tuple[object, .
 
 
 @needs_native
+def test_a_chunk_is_painted_by_tiles_too(paint: Any) -> None:
+    whole, chunk = paint("whole"), paint("tiled", "--tile", 8, "--halo", 2, "--chunk", "2-3")
+    assert len(chunk) == 2
+    assert chunk == {name: whole[name] for name in chunk}
+
+
+@needs_native
 def test_resampled_smoke_is_painted_by_tiles_too(paint: Any, smoke: Path) -> None:
     """Where the cells of a frame are others than those of the first one."""
     path = smoke / "ball_0002.vdb"
@@ -137,6 +144,7 @@ def test_large_frames_are_cut_of_themselves(paint: Any, monkeypatch: Any) -> Non
         (("--tile", 0), "--tile 0: expected a multiple of 8"),
         (("--tile", 8, "--halo", 0), "--halo 0: at least 1 is needed"),
         (("--halo", 2), "--halo: frames are painted as wholes here; give --tile, too"),
+        (("--tile", 8, "--guide", "z"), "--tile: with --guide or --pattern-size frames are painted"),
         (("--memory-budget", "much"), "--memory-budget much: expected auto, or a size"),
     ],
 )
