@@ -518,8 +518,9 @@ const binding = (bytes) =>
   "  return new Proxy(limits.get.call(this), { get: (all, name) =>" +
   `    name === 'maxStorageBufferBindingSize' ? ${bytes} : all[name] }); } });`;
 
-test("what is bound in parts is painted and drawn the same to the bit", { timeout: 10 * PATIENCE }, async () => {
+test("what is bound in parts is painted and drawn the same to the bit", { timeout: 10 * PATIENCE }, async (test) => {
   const wide = await serve(join(MATERIAL, "wide"));
+  test.after(() => wide.close());
   const seen = async (script, ...asked) => {
     const options = { script: `${PARTS};${script}`, size: [80, 80] };
     const { page, errors, close } = await open(browser, `${wide.address}#frame=0&warmup=1`, options);
@@ -546,7 +547,6 @@ test("what is bound in parts is painted and drawn the same to the bit", { timeou
     assert.deepEqual(parts.pixels, whole[k].pixels);
     assert.ok(parts.states.some((value) => value !== 0));
   }
-  wide.close();
 });
 
 /** In the page: nothing happens by itself; and into how many parts what is on the GPU is divided. */
