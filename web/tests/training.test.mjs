@@ -42,7 +42,6 @@ test("curves are drawn and the rule is taken over as it learns", { timeout: 4 * 
       names: [...document.querySelectorAll("#curves figcaption")].map((each) => each.firstChild.textContent),
       lengths: [...document.querySelectorAll("#curves path.mean")].map((each) => each.getTotalLength()),
       inside: document.getElementById("curves").getBoundingClientRect().right <= innerWidth,
-      scale: viewer.stage.layers[0].rule.density,
       weights: [...viewer.stage.layers[0].rule.hidden.values.slice(0, 8)],
     }));
   const early = await seen();
@@ -55,7 +54,7 @@ test("curves are drawn and the rule is taken over as it learns", { timeout: 4 * 
   copyFileSync(join(later, events), join(run, `${events}.more`));
   copyFileSync(join(later, "model.safetensors"), join(run, "model.safetensors"));
   await page.waitForFunction(() => document.querySelector("#curves h2").textContent.includes("60"));
-  await page.waitForFunction((scale) => viewer.stage.layers[0].rule.density !== scale, early.scale);
+  await page.waitForFunction((first) => viewer.stage.layers[0].rule.hidden.values[0] !== first, early.weights[0]);
   const late = await seen();
   assert.notDeepEqual(late.weights, early.weights);
   assert.equal(await page.evaluate(() => viewer.names[0]), "run_watched");
