@@ -144,7 +144,7 @@ def test_large_frames_are_cut_of_themselves(paint: Any, monkeypatch: Any) -> Non
         (("--tile", 0), "--tile 0: expected a multiple of 8"),
         (("--tile", 8, "--halo", 0), "--halo 0: at least 1 is needed"),
         (("--halo", 2), "--halo: frames are painted as wholes here; give --tile, too"),
-        (("--tile", 8, "--guide", "z"), "--tile: with --guide or --pattern-size frames are painted"),
+        (("--tile", 8, "--guide", "z"), "--tile: with --guide or --pattern-size frames are"),
         (("--memory-budget", "much"), "--memory-budget much: expected auto, or a size"),
     ],
 )
