@@ -58,6 +58,12 @@ class Box(NamedTuple):
         u, v, w = (factor * high for high in self.upper)
         return Box((x, y, z), (u, v, w))
 
+    def coarsened(self, factor: int) -> "Box":
+        """The cells `factor` times as wide that hold those of the box."""
+        x, y, z = (low // factor for low in self.lower)
+        u, v, w = (-(-high // factor) for high in self.upper)
+        return Box((x, y, z), (u, v, w))
+
     def slices(self, inside: "Box") -> tuple[slice, slice, slice]:
         """Where this box lies in an array that covers `inside`."""
         x, y, z = (

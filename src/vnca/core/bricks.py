@@ -122,6 +122,12 @@ def covered(bricks: IntArray, box: Box) -> tuple[AnyArray, AnyArray]:
     return first, last
 
 
+def meeting(bricks: IntArray, box: Box) -> BoolArray:
+    """Which of the bricks `[m, 3]` have cells in a box: `[m]`."""
+    first, last = covered(bricks, box)
+    return np.asarray((first < last).all(axis=1))
+
+
 def _column_keys(bricks: AnyArray) -> AnyArray:
     return (bricks[:, 0].astype(np.int64) << 32) + bricks[:, 1]
 

@@ -66,6 +66,11 @@ def with_values(default: T, given: Mapping[str, Any], outer: str = "") -> T:
     return dataclasses.replace(default, **changed)  # type: ignore[type-var]
 
 
+def fields_of(instance: Any) -> dict[str, Any]:
+    """The fields of a dataclass by their names, as they are."""
+    return {field.name: getattr(instance, field.name) for field in dataclasses.fields(instance)}
+
+
 def changed_fields(instance: Any, default: Any) -> list[str]:
     """The names of the fields in which two instances of a dataclass differ."""
     return [

@@ -1,17 +1,17 @@
 """How many cells a painting has, from the nodes of the files' trees, without their values."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from vnca.core import AnyArray, IntArray
+from vnca.core import AnyArray
 from vnca.core.bricks import EDGE
 from vnca.core.field import Field, dilated
 from vnca.core.lattice import Region
+from vnca.engine.automaton import OFFSETS
 from vnca.engine.domain import DomainKind
 from vnca.io import SmokeFormat, read_smoke
 from vnca.io.sequence import Frame, FrameSequence
@@ -126,7 +126,7 @@ def exchanged(alive: Field, tile: int, halo: int) -> Exchange:
     known = {tuple(at): number for number, at in enumerate(tiles.tolist())}
     inside = np.bincount(row.reshape(-1), counts, len(tiles))
     ghosts, pairs = np.zeros(len(tiles)), set()
-    for step in _ways():
+    for step in OFFSETS[OFFSETS.any(axis=1)]:
         reached = own + step
         share = _shared(lowest, reached * tile, tile, halo)
         for brick in np.flatnonzero((share > 0) & (counts > 0)):
@@ -141,10 +141,6 @@ def exchanged(alive: Field, tile: int, halo: int) -> Exchange:
         round((inside + ghosts).max()),
         int(counts.sum()),
     )
-
-
-def _ways() -> Iterable[IntArray]:
-    return (np.array(way) for way in product((-1, 0, 1), repeat=3) if any(way))
 
 
 def _shared(lowest: AnyArray, tiles: AnyArray, tile: int, halo: int) -> AnyArray:

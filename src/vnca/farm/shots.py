@@ -62,8 +62,9 @@ def shots_job(paths: Sequence[Path], chunks: Chunks, program: Sequence[str]) -> 
     tasks: list[Task] = []
     folders: dict[Path, str] = {}
     for path in paths:
-        shot = Shot.load(path).applied(PaintRun(sequence="", out=Path()))
-        if "out" not in Shot.load(path).values:
+        asked = Shot.load(path)
+        shot = asked.applied(PaintRun(sequence="", out=Path()))
+        if "out" not in asked.values:
             raise OptionError(f"{path}: names no `out`, the folder to paint to")
         for label, given in _variants(path, shot, chunks):
             folder = given.out.absolute()

@@ -12,12 +12,12 @@ from typing import Any
 from vnca.core.errors import FileFormatError, OptionError
 from vnca.core.files import existing_file, whole_file, writable_folder
 from vnca.core.memory import memory_budget as budget_of
-from vnca.core.records import require_known, with_values
+from vnca.core.records import fields_of, require_known, with_values
 from vnca.direction.shot import Shot
 from vnca.farm.job import Job, Task
 from vnca.farm.report import Row, report
 from vnca.io import SmokeFormat
-from vnca.recipe import Watch, recorded, smoke
+from vnca.recipe import Watch, first_difference, recorded, smoke
 from vnca.training.config import SmokeConfig
 from vnca.training.presets import DEFAULT, preset
 
@@ -145,8 +145,8 @@ class Sweep:
             device=table.device,
             memory_budget=memory_budget,
             watch=watch,
-            **_fields(table.smoke),
-            **_fields(training.config),
+            **fields_of(table.smoke),
+            **fields_of(training.config),
         )
 
     def _note_down(self, training: Training, folder: Path) -> None:
@@ -158,15 +158,10 @@ class Sweep:
             **recorded(training.config),
         }
         now, path = json.loads(json.dumps(asked)), folder / ASKED
-        if folder.exists() and path.exists():
-            try:
-                then = json.loads(path.read_text(encoding="utf-8"))
-                others = [name for name in now if then.get(name) != now[name]]
-            except (OSError, ValueError, AttributeError) as error:
-                raise FileFormatError(f"{path}: damaged ({error}); remove {folder}") from error
-            if others:
+        if path.exists():
+            if other := first_difference(path, now, f"remove {folder}"):
                 raise OptionError(
-                    f"{folder}: was begun with another {others[0]} than {self.path} has now; "
+                    f"{folder}: was begun with another {other} than {self.path} has now; "
                     "remove it, or give the setting another name"
                 )
             return
@@ -184,10 +179,6 @@ class Sweep:
         with whole_file(path) as temporary:
             temporary.write_text(report(self.path.stem, self.table.frame, rows), encoding="utf-8")
         return path
-
-
-def _fields(instance: Any) -> dict[str, Any]:
-    return {name: getattr(instance, name) for name in instance.__dataclass_fields__}
 
 
 def _trainings(table: Table, settings: Mapping[str, Any]) -> Iterator[Training]:

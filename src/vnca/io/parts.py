@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from vnca.core import Box
-from vnca.core.bricks import covered
+from vnca.core.bricks import meeting
 from vnca.core.errors import FileFormatError, GridError
 from vnca.core.field import Field
 from vnca.core.lattice import Lattice, Placement
@@ -97,8 +97,7 @@ class WholeSmoke(SmokeParts):
 
     def holds(self, box: Box) -> bool:
         """See `SmokeParts.holds`."""
-        first, last = covered(self.smoke.density_field.bricks, box)
-        return bool((first < last).all(axis=1).any())
+        return bool(meeting(self.smoke.density_field.bricks, box).any())
 
     def part(self, box: Box, *, motion: bool = True) -> Volume:
         """See `SmokeParts.part`."""
@@ -118,8 +117,7 @@ class WholeSmoke(SmokeParts):
 
 def _cut(field: Field, box: Box) -> Field:
     """The bricks of a field that meet a box."""
-    first, last = covered(field.bricks, box)
-    kept = (first < last).all(axis=1)
+    kept = meeting(field.bricks, box)
     return replace(field, bricks=field.bricks[kept], values=field.values[kept])
 
 

@@ -238,10 +238,10 @@ class Roll:
     def _advanced(self, ready: Ready, state: RollState, moment: Moment) -> RollState:
         """The state of this rule alone after the steps of a frame."""
         domain, session = ready.domain, ready.session
-        if session is not None and self.styles:
-            session = session.conditioned(self.told(ready, moment))
         if session is None:
             return RollState.empty(self.rule.config.channels, state.steps_done)
+        if self.styles:
+            session = session.conditioned(self.told(ready, moment))
         steering = self.config.steering(moment, domain.cells)
         if steering is not None:
             session = session.steered(steering)

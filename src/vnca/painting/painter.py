@@ -10,6 +10,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Literal
 
+from vnca.core import Box
 from vnca.core.errors import (
     FileFormatError,
     GridError,
@@ -18,6 +19,7 @@ from vnca.core.errors import (
     ShapeError,
     VncaError,
 )
+from vnca.core.field import Field
 from vnca.core.files import existing_file, remove_file, remove_leftovers
 from vnca.core.lattice import Lattice
 from vnca.core.volume import length_of_cells, refined_transform
@@ -256,22 +258,47 @@ class Painter:
             return self.roll.passed(read.take(), left.state)
         painting = self.roll.paint(read.take(), left.state)
         self._begin_to_write(frame, read, left)
+        fields = painting.density_field, painting.colour_field, painting.emission
+        told = self.provenance(read)
+        self.write(self.target(frame), read, told, fields, painting.smoke.box)
+        return painting.state
+
+    def write(
+        self,
+        path: Path,
+        read: Read,
+        provenance: Provenance,
+        fields: tuple[Field, Field, Field | None],
+        box: Box,
+    ) -> None:
+        """Write a painted frame as a whole.
+
+        Args:
+            path: To where.
+            read: What it was painted from.
+            provenance: What it tells of its painting.
+            fields: Density, colour and light.
+            box: Their cells.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        density, colour, emission = fields
         write_painted(
-            self.target(frame),
+            path,
             read.frame.path,
             self.smoke,
-            density=painting.density_field,
-            colour=painting.colour_field,
-            box=painting.smoke.box,
+            density=density,
+            colour=colour,
+            box=box,
             lattice=self.lattice,
             colour_grids=self.colour_grids,
             refine=self.refine,
-            provenance=self.provenance(read),
+            provenance=provenance,
             file=read.file,
-            emission=painting.emission,
+            emission=emission,
             beyond=self.roll.beyond,
         )
-        return painting.state
 
     def provenance(self, read: Read) -> Provenance:
         """What the painting of a frame tells of itself."""

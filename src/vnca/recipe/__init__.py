@@ -23,7 +23,8 @@ from typing import (
 )
 
 from vnca.core import AnyArray, FloatArray
-from vnca.core.errors import ModelError
+from vnca.core.errors import FileFormatError, ModelError
+from vnca.core.files import existing_file
 from vnca.core.records import distributed
 from vnca.io.picture import read_style, style_array
 from vnca.io.smoke_format import SmokeFormat
@@ -124,6 +125,24 @@ def told_of_styles(paths: Sequence[Path], cells: Sequence[float]) -> dict[str, A
 def recorded(options: Any) -> dict[str, Any]:
     """The fields of a dataclass, and of those inside it, as JSON values."""
     return dataclasses.asdict(options, dict_factory=_json)
+
+
+def first_difference(path: Path, now: Mapping[str, Any], instead: str) -> str | None:
+    """The name of what a file of JSON values, written before, has otherwise; None if nothing.
+
+    Args:
+        path: The file.
+        now: The values that it should have.
+        instead: What to do if it cannot be read.
+
+    Raises:
+        FileFormatError: If it cannot.
+    """
+    try:
+        then = json.loads(existing_file(path).read_text(encoding="utf-8"))
+        return next((name for name in now if then.get(name) != now[name]), None)
+    except (OSError, ValueError, AttributeError) as error:
+        raise FileFormatError(f"{path}: damaged ({error}); {instead}") from error
 
 
 def _json(fields: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import vnca
-from vnca.core.errors import FileFormatError, OptionError, OutputError
-from vnca.core.files import existing_file, whole_file, writable_folder
-from vnca.core.records import changed, changed_fields, distributed
+from vnca.core.errors import OptionError, OutputError
+from vnca.core.files import whole_file, writable_folder
+from vnca.core.records import changed, changed_fields, distributed, fields_of
 from vnca.direction import Direction
 from vnca.direction.shot import SUFFIX as SHOT
 from vnca.direction.shot import Shot
@@ -19,7 +19,7 @@ from vnca.io import SmokeFormat
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.painting import StylizeConfig
 from vnca.painting.chunk import Chunking
-from vnca.recipe import SILENT, Watch, painting, recorded, recorded_smoke
+from vnca.recipe import SILENT, Watch, first_difference, painting, recorded, recorded_smoke
 from vnca.recipe.film import FilmConfig
 from vnca.recipe.rendering import CELL_OPACITY
 from vnca.recipe.sequence import fullest_frame, open_sequence
@@ -275,7 +275,7 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
         density_scale=scales.density,
         device=options.device,
         smoke=smoke,
-        config=StylizeConfig(**_fields(options.direction), seed=options.seed),
+        config=StylizeConfig(**fields_of(options.direction), seed=options.seed),
         film=options.film if is_filmed else FilmConfig(),
         chunking=options.chunking,
     )
@@ -284,10 +284,6 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
         return
     with closing(painting.run(asked, watch, style)) as paths:  # type: ignore[type-var]
         yield from paths
-
-
-def _fields(direction: Direction) -> dict[str, Any]:
-    return {field.name: getattr(direction, field.name) for field in dataclasses.fields(direction)}
 
 
 def _begin(options: PaintRun) -> bool:
@@ -307,14 +303,9 @@ def _begin(options: PaintRun) -> bool:
                 f"{options.out}: holds a painting already; go on with `resume`, or choose another "
                 "`out` or `overwrite`"
             )
-        try:
-            then = json.loads(existing_file(path).read_text(encoding="utf-8"))
-            others = [name for name in now if then.get(name) != now[name]]
-        except (OSError, ValueError, AttributeError) as error:
-            raise FileFormatError(f"{path}: damaged ({error}); begin anew") from error
-        if others:
+        if other := first_difference(path, now, "begin anew"):
             raise OptionError(
-                f"{options.out}: cannot go on, since `{others[0]}` is another than when it was "
+                f"{options.out}: cannot go on, since `{other}` is another than when it was "
                 "begun; make it the same, or begin anew with `overwrite`"
             )
         return options.resume

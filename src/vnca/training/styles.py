@@ -16,6 +16,7 @@ from torch import Tensor
 
 from vnca.core import FloatArray
 from vnca.core.errors import OptionError
+from vnca.engine.automaton import OFFSETS
 from vnca.engine.domain import Domain
 from vnca.rule.conditioning import STYLES
 from vnca.training.config import TrainingConfig
@@ -153,7 +154,7 @@ class Lessons:
     def _mask(self, wave: Sequence[float]) -> FloatArray:
         """`[n]`, a smooth wave across the box, from one of 26 sides, clamped to 0 and 1."""
         number = int(wave[0] * 26)
-        along = np.array(np.unravel_index(number + (number >= 13), (3, 3, 3))) - 1  # not (0, 0, 0)
+        along = OFFSETS[number + (number >= 13)]  # not (0, 0, 0)
         low, high = map(math.log, SHARPNESS)
         sharpness = np.exp(low + wave[1] * (high - low))
         height = np.cos(2 * np.pi * (self._places @ along + wave[2]))

@@ -78,7 +78,7 @@ def _read(path: Path) -> tuple[AnyArray, AnyArray, AnyArray]:
         starts, ends = points[:-1], points[1:]
         straight = (ends - starts) / np.linalg.norm(ends - starts, axis=1, keepdims=True)
         middle = straight[:-1] + straight[1:]
-        at_points = np.concatenate([straight[:1], middle, straight[-1:]]).astype(np.float64)
+        at_points = np.concatenate([straight[:1], middle, straight[-1:]])
         at_points = unit(at_points).astype(np.float64)
         parts.append((starts, ends, np.stack([at_points[:-1], at_points[1:]], axis=1)))
     starts, ends, tangents = (np.concatenate(each) for each in zip(*parts, strict=True))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vnca.core import AnyArray, Box
-from vnca.core.bricks import CELLS, EDGE, covered
+from vnca.core.bricks import CELLS, EDGE, meeting
 from vnca.core.field import Field
 from vnca.core.lattice import Placement
 from vnca.core.scratch import Scratch
@@ -28,9 +28,7 @@ _COLOUR = COLOUR_GRIDS[0]
 
 def tiles_of(box: Box, edge: int) -> Iterator[Box]:
     """Cubes of so many cells a side that cover a box; where they lie does not depend on it."""
-    first = [low // edge for low in box.lower]
-    last = [-(-high // edge) for high in box.upper]
-    for x, y, z in product(*map(range, first, last)):
+    for x, y, z in product(*map(range, *box.coarsened(edge))):
         yield Box((x, y, z), (x + 1, y + 1, z + 1)).refined(edge)
 
 
@@ -124,13 +122,10 @@ class PaintedParts:
 
     def _in_source(self, box: Box) -> Box:
         """The cells of the source in which those of the file lie, at least."""
-        x, y, z = (low // self._refine for low in box.lower)
-        u, v, w = (-(-high // self._refine) for high in box.upper)
-        return Box((x, y, z), (u, v, w)).grown(1)
+        return box.coarsened(self._refine).grown(1)
 
     def _keep(self, name: str, own: Box, values: Field, active: Field, background: Any) -> None:
-        first, last = covered(active.bricks, own)
-        bricks = active.bricks[(first < last).all(axis=1)]
+        bricks = active.bricks[meeting(active.bricks, own)]
         if name not in self._waiting:
             self._waiting[name] = _Waiting(self._folder, values, background)
         self._waiting[name].add(bricks, active.blocks(bricks), values.blocks(bricks))

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from vnca.core import Box, IntArray
-from vnca.core.bricks import covered
+from vnca.core.bricks import meeting
 from vnca.core.field import Field
 from vnca.io.vdb.grid import MOST_TILE_CELLS, Grid
 from vnca.io.vdb.layout import LEAF_EDGE, Cursor
@@ -69,9 +69,8 @@ class GridIndex:
         tiles = self.grid.tree.tiles
         at = tiles.origins[tiles.active].astype(np.int64)
         ends = at + tiles.edges[tiles.active][:, None]
-        first, last = covered(self.leaves.origins // LEAF_EDGE, box)
         return bool(
-            (first < last).all(axis=1).any()
+            meeting(self.leaves.origins // LEAF_EDGE, box).any()
             or ((at < box.upper) & (ends > box.lower)).all(axis=1).any()
         )
 
@@ -82,8 +81,7 @@ class GridIndex:
             FileFormatError: If a leaf there is corrupt.
             GridError: If the file has been closed.
         """
-        first, last = covered(self.leaves.origins // LEAF_EDGE, box)
-        chosen = np.flatnonzero((first < last).all(axis=1))
+        chosen = np.flatnonzero(meeting(self.leaves.origins // LEAF_EDGE, box))
         grid, tree = self.grid, self.leaves.tree(self.cursor_at, chosen)
         return GridPart(
             *(grid.name, grid.value_type, grid.transform, tree, grid.metadata, grid.is_half),

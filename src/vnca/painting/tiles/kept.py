@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vnca.core import AnyArray, Box, FloatArray, IntArray
-from vnca.core.bricks import cells_at, covered
+from vnca.core.bricks import cells_at, meeting
 from vnca.core.field import Field
 from vnca.core.marks import packed, unpacked
 from vnca.core.scratch import Scratch
@@ -37,11 +37,11 @@ class Kept:
 
     def holds(self, box: Box) -> bool:
         """Whether there may be cells in a box."""
-        return bool(self._meeting(box).any())
+        return bool(meeting(self.bricks, box).any())
 
     def within(self, box: Box) -> tuple[IntArray, FloatArray]:
         """The cells `[n, 3]` in a box, in the order of a `Domain`, and their values `[n, C]`."""
-        some = np.flatnonzero(self._meeting(box))
+        some = np.flatnonzero(meeting(self.bricks, box))
         some = some[np.lexsort(self.bricks[some].T[::-1])]
         cells, values = self._of(some)
         inside = ((cells >= box.lower) & (cells < box.upper)).all(axis=1)
@@ -53,10 +53,6 @@ class Kept:
         """All cells and their values, some at a time."""
         for start in range(0, len(self.bricks), _BRICKS_AT_ONCE):
             yield self._of(np.arange(start, min(start + _BRICKS_AT_ONCE, len(self.bricks))))
-
-    def _meeting(self, box: Box) -> AnyArray:
-        first, last = covered(self.bricks, box)
-        return np.asarray((first < last).all(axis=1))
 
     def _of(self, some: AnyArray) -> tuple[IntArray, FloatArray]:
         where = unpacked(self.marks[some])

@@ -10,7 +10,6 @@ import numpy as np
 
 from vnca.core import Box
 from vnca.core.field import Field
-from vnca.io import write_painted
 from vnca.io.painted.parts import PaintedParts, tiles_of
 from vnca.io.parts import SmokeParts, VdbSmoke, open_parts
 from vnca.io.provenance import Provenance
@@ -114,23 +113,9 @@ class _Whole:
 
     def write(self, path: Path, provenance: Provenance) -> None:
         """See `PaintedParts.write`."""
-        painter, read = self._painter, self._read
         density, colour, emission = map(self._joined, zip(*self._parts, strict=True))
-        write_painted(
-            path,
-            read.frame.path,
-            painter.smoke,
-            density=density,
-            colour=colour,
-            box=self._box,
-            lattice=painter.lattice,
-            colour_grids=painter.colour_grids,
-            refine=painter.refine,
-            provenance=provenance,
-            file=read.file,
-            emission=emission,
-            beyond=painter.roll.beyond,
-        )
+        fields = density, colour, emission
+        self._painter.write(path, self._read, provenance, fields, self._box)
 
     def _joined(self, parts: Sequence[Field | None]) -> Any:
         some = [part for part in parts if part is not None]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vnca.core import AnyArray, Box, FloatArray, IntArray
-from vnca.core.bricks import covered
+from vnca.core.bricks import meeting
 from vnca.core.volume import Volume
 from vnca.direction import Carried, Moment
 from vnca.direction.moment import DEEPEST, HIGHEST
@@ -117,7 +117,7 @@ class TiledRoll:
         """
         roll = self.roll
         moved = roll.config.fluff * roll.grid
-        inner = _coarser(box, roll.finer).grown(roll.colour_dilation + moved + 2 * _BESIDE)
+        inner = box.coarsened(roll.finer).grown(roll.colour_dilation + moved + 2 * _BESIDE)
         aimed = roll.config.asks_for_places
         part = self._part(smoke, inner.grown(self._sight + _BESIDE), motion=aimed)
         moment = replace(roll.moment_of(part), carried=state.carried)
@@ -151,7 +151,7 @@ class TiledRoll:
     def _part(self, smoke: SmokeParts, box: Box, *, motion: bool = True) -> Volume:
         """What is in a box of the automaton's cells."""
         grid = self.roll.grid
-        coarse = _coarser(box, grid).grown(1 if grid > 1 else 0)
+        coarse = box.coarsened(grid).grown(1 if grid > 1 else 0)
         return smoke.part(coarse, motion=motion).refined(grid)
 
     def _tiles(self, smoke: SmokeParts) -> list[Box]:
@@ -162,7 +162,7 @@ class TiledRoll:
             return list(tiles_of(box, self.tiling.edge))
         grid = self.roll.grid
         tiles = tiles_of(smoke.box.refined(grid).grown(reach), self.tiling.edge)
-        return [tile for tile in tiles if smoke.holds(_coarser(tile.grown(reach), grid).grown(1))]
+        return [tile for tile in tiles if smoke.holds(tile.grown(reach).coarsened(grid).grown(1))]
 
     def _begin(
         self, smoke: SmokeParts, before: Sequence[TiledState]
@@ -215,8 +215,7 @@ class TiledRoll:
         velocity = part.velocity_field
         if velocity is None:
             return 0
-        first, last = covered(velocity.bricks, tile.grown(_BESIDE))
-        near = velocity.values[(first < last).all(axis=1)]
+        near = velocity.values[meeting(velocity.bricks, tile.grown(_BESIDE))]
         fastest = float(np.abs(near).max(initial=0))
         times = [1.0]
         for roll, was in zip(self.rolls, before, strict=True):
@@ -327,10 +326,3 @@ def _joined(parts: Sequence[Carried]) -> Carried | None:
     cells = np.concatenate([part.cells for part in parts])
     names = parts[0].values
     return Carried(cells, {n: np.concatenate([part.values[n] for part in parts]) for n in names})
-
-
-def _coarser(box: Box, factor: int) -> Box:
-    """The cells `factor` times as wide that hold those of a box."""
-    x, y, z = (low // factor for low in box.lower)
-    u, v, w = (-(-high // factor) for high in box.upper)
-    return Box((x, y, z), (u, v, w))

@@ -17,7 +17,7 @@ namespace nb = nanobind;
 using Input = nb::ndarray<nb::ro>;
 using Output = nb::ndarray<>;
 
-constexpr std::int64_t ANY = -1;
+constexpr std::int64_t ANY = -1, MOST_CHANNELS = 64;
 
 template <class T>
 constexpr const char* NAME = "float32";

@@ -25,7 +25,7 @@ using namespace vnca;
 
 namespace {
 
-constexpr std::int64_t MOST_CHANNELS = 64, MOST_HIDDEN = 512, MOST_PRIORS = 16;
+constexpr std::int64_t MOST_HIDDEN = 512, MOST_PRIORS = 16;
 
 // Each filter's scale over its integer form.
 void read_scales(const float* stencil, float* scale) {
@@ -237,8 +237,9 @@ NB_MODULE(_native, m) {
 
     m.def("backward", [](Input state, Input rows, Input neighbours, Input priors, Input first,
                          Input bias, Input second, Input stencil,
-                         const std::optional<Input>& steering, Input gradient, Output to_state, Output to_first, Output to_bias, Output to_second,
-                         int threads, bool bfloat16, const std::string& instructions) {
+                         const std::optional<Input>& steering, Input gradient, Output to_state,
+                         Output to_first, Output to_bias, Output to_second, int threads,
+                         bool bfloat16, const std::string& instructions) {
         const Arrays arrays(state, rows, neighbours, priors, first, bias, second, stencil, steering);
         const Step& step = arrays.step;
         const Kernel& kernel = kernel_named(instructions, bfloat16);

@@ -12,11 +12,6 @@
 #include "carry.hpp"
 
 namespace vnca {
-namespace {
-
-constexpr std::int64_t MOST_CHANNELS = 64;
-
-}  // namespace
 
 void bind_carry(nb::module_& m) {
     m.def("carry", [](Input state, Input bricks, Input rows, std::array<std::int32_t, 3> lower,

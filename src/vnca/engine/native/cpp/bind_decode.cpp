@@ -17,7 +17,7 @@
 namespace vnca {
 namespace {
 
-constexpr std::int64_t MOST_CHANNELS = 64, MOST_UNITS = 128;
+constexpr std::int64_t MOST_UNITS = 128;
 
 // Weights and bias of each layer in turn.
 using InputWeights = std::array<Input, 2 * LAYERS>;
