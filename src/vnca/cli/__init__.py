@@ -8,7 +8,8 @@ import vnca
 from vnca.cli.help import ASKED, JSON_PROGRESS
 from vnca.cli.options import command_at, spelled_out, usage
 from vnca.cli.terminal import as_options, end_line, event, json_events, terminable
-from vnca.core.errors import Terminated, TextError, VncaError
+from vnca.core.errors import OptionError, Terminated, TextError, VncaError
+from vnca.ranks import ended, give_up, launched
 
 COMMANDS = {
     "paint": "paint a sequence in the style of a picture: train, stylize and film in one go",
@@ -39,6 +40,8 @@ HOMES = {name: f"{name}:run" for name in COMMANDS} | {
     "plan": "farm:run_plan",
 }
 """The function of each command, as `module:function` of this package."""
+SHARED = ("paint", "stylize")
+"""What several ranks of MPI do together."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -55,9 +58,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         try:
             with json_events(wanted=JSON_PROGRESS in words):
-                return _call([word for word in words if word != JSON_PROGRESS])
+                code = _call([word for word in words if word != JSON_PROGRESS])
         finally:
             sys.stdout.flush()
+        return ended(code)
     except BrokenPipeError:
         # The reader of our output went away, as `head` does; Python would complain at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -75,6 +79,8 @@ def _call(arguments: Sequence[str]) -> int:
     if name not in COMMANDS:
         return _failed(f"'{name}' is not a command; expected one of {', '.join(COMMANDS)}")
     try:
+        if launched().size > 1 and name not in SHARED:
+            raise OptionError(f"mpirun: ranks share {' and '.join(SHARED)} alone, not {name}")
         with terminable():
             command_at(HOMES[name])(rest)
     except TextError as error:
@@ -103,8 +109,9 @@ def _failed(message: str, shown: Sequence[str] = ()) -> int:
     end_line()
     # What a library says of a damaged file may have several lines.
     line = as_options(" ".join(message.split()))
+    give_up(line)
     if not event("error", message=line, exit_code=2):
-        print("vnca:", line, file=sys.stderr)
+        print(f"vnca: {line}\n", end="", file=sys.stderr)  # whole, where several write there
         for each in shown:
             print(f"  {each}", file=sys.stderr)
     return 2

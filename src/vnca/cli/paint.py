@@ -15,7 +15,8 @@ from vnca.direction.shot import SUFFIX as SHOT
 from vnca.direction.shot import Shot
 from vnca.io import SmokeFormat
 from vnca.painting import StylizeConfig
-from vnca.recipe import paint, painting, recorded_smoke, rendering
+from vnca.ranks import launched
+from vnca.recipe import SILENT, paint, painting, recorded_smoke, rendering
 from vnca.recipe.film import FilmConfig
 from vnca.rule.model import Model
 
@@ -54,8 +55,9 @@ def run(arguments: Sequence[str]) -> None:
     if smoke != options.smoke:
         options = _asked(shot, arguments, smoke)
     options.require_one_style()
+    ranks = launched()
     with finishing() as stop_if_asked:
-        for _ in paint.run(options, Terminal(stop_if_asked)):
+        for _ in paint.run(options, Terminal(stop_if_asked) if ranks.leads else SILENT, ranks):
             pass
 
 
@@ -108,8 +110,10 @@ def run_stylize(arguments: Sequence[str]) -> None:
         missing: Any = tyro.MISSING
         defaults = Stylize(model=missing, sequence=missing, out=missing, smoke=smoke)
         options = parse("stylize", Stylize, arguments, default=defaults)
+    ranks = launched()
     with finishing() as stop_if_asked:
-        for _ in painting.run(options, Terminal(stop_if_asked), model):
+        watch = Terminal(stop_if_asked) if ranks.leads else SILENT
+        for _ in painting.run(options, watch, model, ranks):
             pass
 
 

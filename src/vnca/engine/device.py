@@ -45,6 +45,19 @@ def device_named(name: str) -> str:
     return "cpu"
 
 
+def shared_device(device: str, rank: int) -> str:
+    """The GPU of one of several programs on a machine, each its own as far as there are enough.
+
+    Args:
+        device: As of `device_named`; cpu, or a GPU by its number, stays.
+        rank: Number of the program on its machine.
+    """
+    if device != "cuda":
+        return device
+    count = import_module("vnca.engine.tensors").count_gpus()
+    return f"cuda:{rank % max(1, count)}"
+
+
 def _has_driver() -> bool:
     """Whether a driver is installed without which torch finds no GPU."""
     for library in ("libcuda.so.1", "nvcuda.dll", "libamdhip64.so"):

@@ -25,6 +25,11 @@ def tensor_session(
     return StepSession.open(job, draw=draw, update=update, place=place, back=_array)
 
 
+def count_gpus() -> int:
+    """How many GPUs torch finds."""
+    return torch.cuda.device_count()
+
+
 def why_no_gpu(device: str) -> str | None:
     """Why torch cannot compute on a GPU, `cuda` or such as `cuda:1`, or nothing if it can."""
     if torch.version.cuda is None and torch.version.hip is None:

@@ -10,10 +10,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
-from vnca.core import Box
-from vnca.core.bricks import meeting
+import numpy as np
+
+from vnca.core import AnyArray, Box
+from vnca.core.bricks import CELLS, covered, meeting
 from vnca.core.errors import FileFormatError, GridError
 from vnca.core.field import Field
 from vnca.core.lattice import Lattice, Placement
@@ -54,6 +57,10 @@ class SmokeParts(ABC):
         """Whether there may be smoke in a box."""
 
     @abstractmethod
+    def count(self, box: Box) -> float:
+        """About how many cells of smoke there are in a box."""
+
+    @abstractmethod
     def part(self, box: Box, *, motion: bool = True) -> Volume:
         """The frame with the smoke in a box, and whatever there is elsewhere.
 
@@ -66,9 +73,17 @@ class SmokeParts(ABC):
             GridError: If values there are no smoke.
         """
 
+    @property
     @abstractmethod
-    def require(self) -> None:
-        """Refuse a frame that, as the parts so far tell, is no smoke.
+    def seen(self) -> tuple[float, float]:
+        """The least and the greatest density of the parts so far, as `density_range` has them."""
+
+    @abstractmethod
+    def require(self, seen: tuple[float, float]) -> None:
+        """Refuse a frame that is no smoke.
+
+        Args:
+            seen: The least and the greatest density of its parts, whoever took them.
 
         Raises:
             GridError: If it is none.
@@ -99,6 +114,18 @@ class WholeSmoke(SmokeParts):
         """See `SmokeParts.holds`."""
         return bool(meeting(self.smoke.density_field.bricks, box).any())
 
+    def count(self, box: Box) -> float:
+        """See `SmokeParts.count`."""
+        density = self.smoke.density_field
+        first, last = covered(density.bricks, box)
+        share = np.prod(np.maximum(last - first, 0), axis=1) / CELLS
+        return float((share * self._counts).sum())
+
+    @cached_property
+    def _counts(self) -> AnyArray:
+        """`[m]` cells of smoke in each brick."""
+        return np.count_nonzero(self.smoke.density_field.values, axis=(1, 2, 3))
+
     def part(self, box: Box, *, motion: bool = True) -> Volume:
         """See `SmokeParts.part`."""
         smoke = self.smoke
@@ -111,8 +138,13 @@ class WholeSmoke(SmokeParts):
             {name: _cut(held, box) for name, held in smoke.named_fields.items()},
         )
 
-    def require(self) -> None:
+    @property
+    def seen(self) -> tuple[float, float]:
         """Nothing: it was looked at when it was read."""
+        return 0.0, 0.0
+
+    def require(self, seen: tuple[float, float]) -> None:
+        """See `seen`."""
 
 
 def _cut(field: Field, box: Box) -> Field:
@@ -157,6 +189,15 @@ class VdbSmoke(SmokeParts):
         """See `SmokeParts.holds`."""
         return self.density.holds(self.place.inverse.box(box))
 
+    def count(self, box: Box) -> float:
+        """See `SmokeParts.count`."""
+        return self.density.count(self.place.inverse.box(box))
+
+    @property
+    def seen(self) -> tuple[float, float]:
+        """See `SmokeParts.seen`."""
+        return self._range
+
     def part(self, box: Box, *, motion: bool = True) -> Volume:
         """See `SmokeParts.part`; one thread at a time reads from the file."""
         with self._one_reader:
@@ -181,9 +222,9 @@ class VdbSmoke(SmokeParts):
         path = self.file.path
         return made_ours(stored, path, format, frame=self.frame, lattice=self.lattice)
 
-    def require(self) -> None:
+    def require(self, seen: tuple[float, float]) -> None:
         """See `SmokeParts.require`."""
-        require_density(self._range, self.file.path)
+        require_density(seen, self.file.path)
 
 
 def open_parts(

@@ -33,6 +33,7 @@ from vnca.painting.chunk import WHOLE, Chunk
 from vnca.painting.frames import VelocityCheck, read_ahead
 from vnca.painting.read import Read, close
 from vnca.painting.unfinished import Source, Unfinished
+from vnca.ranks import Alone, Ranks
 
 OnError = Literal["stop", "skip", "hold"]
 BROKEN = (FileFormatError, GridError, ShapeError)
@@ -64,6 +65,7 @@ class Painter:
         refine: How many times as fine as the smoke's the grid of the painting is.
         facts: What else files tell of their painting, beside how opaque it is to be seen.
         chunk: Which of the frames are painted, and how they follow those before.
+        ranks: Who shares the frames, by their tiles.
     """
 
     sequence: FrameSequence
@@ -78,6 +80,7 @@ class Painter:
     refine: int = 1
     facts: Mapping[str, str | int | float] = field(default_factory=dict)
     chunk: Chunk = WHOLE
+    ranks: Ranks = field(default_factory=Alone)
     _velocity: VelocityCheck = field(init=False)
 
     def __post_init__(self) -> None:
@@ -118,7 +121,9 @@ class Painter:
                 replaced.
         """
         path, first, left = self.unfinished_path, self.chunk.first, self.chunk.state_out
-        remove_leftovers(self.out, {self.target(f).name for f in self.frames} | {path.name})
+        if self.ranks.leads:
+            names = {self.target(frame).name for frame in self.frames}
+            remove_leftovers(self.out, names | {path.name})
         if path.exists() and resume:
             unfinished = self._loaded(path)
             self._require_unchanged(unfinished.sources)
@@ -195,25 +200,27 @@ class Painter:
                 if held is not before:
                     close(before)
                 sources.append(source)
-                if time.monotonic() >= due:
+                if self.ranks.every(time.monotonic() >= due)[0]:
                     begun = time.monotonic()
-                    Unfinished(self.conditions, tuple(sources), state).save(self.unfinished_path)
+                    self._save(sources, state, self.unfinished_path)
                     saved, ended = len(sources), time.monotonic()
                     due = ended + (ended - begun) / _SAVING_SHARE
                 if len(sources) > first:
                     yield self.target(frame) if source else None
             if self.chunk.state_out is not None:
-                Unfinished(self.conditions, tuple(sources), state).save(self.chunk.state_out)
+                self._save(sources, state, self.chunk.state_out)
         finally:
             reads.close()
             close(held)
-            if len(sources) > saved:
+            # Of several ranks, the others may not be there any more.
+            if len(sources) > saved and self.ranks.size == 1:
                 with suppress(OutputError):
-                    Unfinished(self.conditions, tuple(sources), state).save(self.unfinished_path)
+                    self._save(sources, state, self.unfinished_path)
 
     def discard(self) -> None:
         """Forget the state: there is nothing to go on with."""
-        remove_file(self.unfinished_path)
+        if self.ranks.leads:
+            remove_file(self.unfinished_path)
 
     def _finish(
         self, frame: Frame, read: Read | VncaError, held: Read | None, left: Unfinished
@@ -235,6 +242,10 @@ class Painter:
                 remove_file(self.target(frame))
             return held, left.state, None
 
+    def _save(self, sources: Sequence[Source | None], state: Any, path: Path) -> None:
+        """Keep what is finished, and the state that it left."""
+        Unfinished(self.conditions, tuple(sources), state).save(path)
+
     def _start(self) -> Any:
         """The state before the first frame."""
         return self.roll.start()
@@ -249,7 +260,7 @@ class Painter:
         if frame == self.frames[0]:
             # From here on frames of an earlier painting are overwritten, and after an end at any
             # moment it is this one that can be gone on with.
-            left.save(self.unfinished_path)
+            self._save(left.sources, left.state, self.unfinished_path)
 
     def _write(self, frame: Frame, read: Read, left: Unfinished) -> Any:
         """Paint smoke to the file of a frame, unless it comes before the chunk; the state after."""

@@ -19,6 +19,7 @@ from vnca.io import SmokeFormat
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.painting import StylizeConfig
 from vnca.painting.chunk import Chunking
+from vnca.ranks import Alone, Ranks
 from vnca.recipe import SILENT, Watch, first_difference, painting, recorded, recorded_smoke
 from vnca.recipe.film import FilmConfig
 from vnca.recipe.rendering import CELL_OPACITY
@@ -233,8 +234,13 @@ def recorded_format(options: PaintRun) -> SmokeFormat:
     return recorded_smoke(options.picture, Model.load(options.picture)) or options.smoke
 
 
-def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
+def run(options: PaintRun, watch: Watch, ranks: Ranks | None = None) -> Iterator[Path | None]:
     """Train, and paint frame by frame.
+
+    Args:
+        options: What to do.
+        watch: Is told how far it has come, and may cancel.
+        ranks: Who shares the painting, with a model that is there.
 
     Yields:
         The file of each frame as it is finished.
@@ -243,6 +249,10 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
         VncaError: As `paint` does.
     """
     options.require_one_style()
+    ranks = ranks or Alone()
+    paints = options.only == "paint" or (options.only is None and options.is_trained)
+    if ranks.size > 1 and not paints:
+        raise OptionError("mpirun: ranks share the painting alone; do it with `only` paint")
     sequence = open_sequence(options.sequence, options.frames, watch)
     goes_on = _begin(options)
     model, smoke, scales = options.picture or Path(options.name), options.smoke, painting.Scales()
@@ -282,7 +292,7 @@ def run(options: PaintRun, watch: Watch) -> Iterator[Path | None]:
     if options.only == "film":
         painting.film_painted(asked, watch, style)
         return
-    with closing(painting.run(asked, watch, style)) as paths:  # type: ignore[type-var]
+    with closing(painting.run(asked, watch, style, ranks)) as paths:  # type: ignore[type-var]
         yield from paths
 
 

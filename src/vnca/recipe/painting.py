@@ -27,8 +27,10 @@ from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.painting import Roll, StylizeConfig
 from vnca.painting.chunk import Chunk, Chunking
 from vnca.painting.painter import OnError, Painter
-from vnca.painting.tiles import EDGES, Tiling, bytes_needed, likely_edge
+from vnca.painting.tiles import EDGES, Tiling, bytes_needed, likely_edge, shared_edge
+from vnca.painting.tiles.deal import shared
 from vnca.painting.tiles.painter import TiledPainter
+from vnca.ranks import Alone, Ranks
 from vnca.recipe import Watch, recorded, tracked
 from vnca.recipe.directing import digest, directed, say_styles
 from vnca.recipe.film import Film, FilmConfig, Shown
@@ -144,7 +146,9 @@ _TOLD = ("strength", "density_strength", "steps_per_frame", "domain")
 """What painted files tell one by one."""
 
 
-def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterator[Path | None]:
+def run(
+    options: StylizeRun, watch: Watch, model: Model | None = None, ranks: Ranks | None = None
+) -> Iterator[Path | None]:
     """Make ready to paint as asked; memory does not grow with the length of the sequence.
 
     Args:
@@ -152,6 +156,7 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
         watch: Is told how far it has come. What it raises ends the painting once a frame is
             finished.
         model: The model of the options, if it is loaded already.
+        ranks: Who shares the tiles of each frame; all call this, with the same options.
 
     Returns:
         What paints: the file of each frame as it is finished, None for one that is left out.
@@ -160,7 +165,8 @@ def run(options: StylizeRun, watch: Watch, model: Model | None = None) -> Iterat
         VncaError: If an input cannot be used or the output cannot be written.
     """
     count = _Count(watch)
-    return _paint(_painter(options, watch, model, count), options, watch, count)
+    painter = _painter(options, watch, model, count, ranks or Alone())
+    return _paint(painter, options, watch, count)
 
 
 def film_painted(options: StylizeRun, watch: Watch, model: Model | None = None) -> None:
@@ -175,7 +181,7 @@ def film_painted(options: StylizeRun, watch: Watch, model: Model | None = None) 
         SequenceError: If a frame is not there yet.
         VncaError: If an input cannot be used, or the film cannot be written.
     """
-    painter = _painter(options, watch, model, _Count(watch))
+    painter = _painter(options, watch, model, _Count(watch), Alone())
     for target in map(painter.target, painter.frames):
         if not target.exists() or read_provenance(target) is None:
             raise SequenceError(f"{target}: is not painted yet; a film shows all of its frames")
@@ -188,7 +194,9 @@ def film_painted(options: StylizeRun, watch: Watch, model: Model | None = None) 
     watch.made("film", options.preview)
 
 
-def _painter(options: StylizeRun, watch: Watch, model: Model | None, count: "_Count") -> Painter:
+def _painter(
+    options: StylizeRun, watch: Watch, model: Model | None, count: "_Count", ranks: Ranks
+) -> Painter:
     """What paints as asked, after a look at all that it takes."""
     model = model or Model.load(options.model)
     rule = model.rule.rescaled(density=options.density_scale, gamma=options.gamma)
@@ -197,7 +205,7 @@ def _painter(options: StylizeRun, watch: Watch, model: Model | None, count: "_Co
     writable_folder(options.out)
     if chunk.state_out is not None:
         writable_file(chunk.state_out)
-    if options.preview:
+    if options.preview and ranks.leads:
         writable_file(options.preview)
         remove_leftovers(options.preview.parent, [options.preview.name])
     if any(f.path.resolve().parent == options.out.resolve() for f in sequence):
@@ -206,7 +214,7 @@ def _painter(options: StylizeRun, watch: Watch, model: Model | None, count: "_Co
     region = sequence_region(sequence, smoke, watch, without_broken=options.on_error != "stop")
     require_dense_enough(sequence, smoke, rule.scales.density)
     rule = placed(rule, region, watch)
-    compute = compute_of(options.backend, options.device, options.precision)
+    compute = shared(compute_of(options.backend, options.device, options.precision), ranks)
     backend = choose(compute, steered=options.config.steers).name
     ready = directed(
         Roll(rule, options.config, region.box, compute), model, options.refine, sequence, smoke
@@ -214,7 +222,7 @@ def _painter(options: StylizeRun, watch: Watch, model: Model | None, count: "_Co
     say_styles(model, options.config, watch)
     roll = ready.roll
     facts = _facts(options, model, roll)
-    tiling = _tiling(options, roll, sequence, watch)
+    tiling = _tiling(options, roll, sequence, watch, ranks)
     make = Painter if tiling is None else partial(TiledPainter, tiling=tiling, watch=count.note)
     return make(
         sequence,
@@ -252,6 +260,7 @@ def _painter(options: StylizeRun, watch: Watch, model: Model | None, count: "_Co
         refine=options.refine,
         facts=facts,
         chunk=chunk,
+        ranks=ranks,
     )
 
 
@@ -270,21 +279,26 @@ class _Count:
 
 
 def _tiling(
-    options: StylizeRun, roll: Roll, sequence: FrameSequence, watch: Watch
+    options: StylizeRun, roll: Roll, sequence: FrameSequence, watch: Watch, ranks: Ranks
 ) -> Tiling | None:
     """How frames are cut; None where they are painted as wholes."""
+    if ranks.size > 1 and options.on_error != "stop":
+        raise OptionError(f"`on_error` {options.on_error}: not with several ranks of MPI")
     if options.config.steers:
-        if options.tile is not None or options.halo is not None:
+        if options.tile is not None or options.halo is not None or ranks.size > 1:
             raise OptionError(
-                "`tile`: with `guide` or `pattern_size` frames are painted as wholes; leave it out"
+                "`tile`: with `guide` or `pattern_size` frames are painted as wholes; leave it "
+                f"out{' and paint without mpirun' if ranks.size > 1 else ''}"
             )
         return None
     if options.tile is not None:
         return Tiling(options.tile, options.halo)
     given = memory_budget(options.memory_budget)
-    budget = given or free_memory() / 2
+    budget = given or free_memory() / 2 / ranks.beside
     cells = max(smoke_cells(frame.path, options.smoke) for frame in sequence)
     sizes = {"grid": roll.grid, "finer": roll.finer}
+    if ranks.size > 1:
+        return Tiling(shared_edge(budget, cells, ranks.size, **sizes), options.halo)
     needed = bytes_needed(cells, **sizes)
     if needed <= budget:
         if options.halo is not None:
@@ -305,7 +319,7 @@ def _paint(
     total, finished, first = len(painter.frames), 0, painter.chunk.first
     count.total = total
     with ExitStack() as stack:
-        film = _film(options, painter, stack, watch)
+        film = _film(options, painter, stack, watch) if painter.ranks.leads else None
         unfinished = painter.begin(resume=options.resume, overwrite=options.overwrite)
         already = max(0, len(unfinished.sources) - first)
         try:

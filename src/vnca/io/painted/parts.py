@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from vnca.core import AnyArray, Box
 from vnca.core.bricks import CELLS, EDGE, meeting
@@ -124,24 +125,51 @@ class PaintedParts:
         """The cells of the source in which those of the file lie, at least."""
         return box.coarsened(self._refine).grown(1)
 
+    def pieces(self) -> Iterator["Piece"]:
+        """All that was added, some at a time, for the same frame in another program."""
+        for name, kept in self._waiting.items():
+            yield from kept.pieces(name)
+
+    def take(self, piece: "Piece") -> None:
+        """What was added in another program; see `pieces`."""
+        name, background, bricks, active, values = piece
+        if name not in self._waiting:
+            self._waiting[name] = _Waiting(self._folder, background, values.dtype)
+        self._waiting[name].add(bricks, active, values)
+
     def _keep(self, name: str, own: Box, values: Field, active: Field, background: Any) -> None:
         bricks = active.bricks[meeting(active.bricks, own)]
-        if name not in self._waiting:
-            self._waiting[name] = _Waiting(self._folder, values, background)
-        self._waiting[name].add(bricks, active.blocks(bricks), values.blocks(bricks))
+        kind, dtype = values.values.shape[4:], values.values.dtype
+        empty = np.array(np.broadcast_to(np.asarray(background, dtype), kind))
+        self.take(Piece(name, empty, bricks, active.blocks(bricks), values.blocks(bricks)))
+
+
+class Piece(NamedTuple):
+    """Some leaves of a grid that is to be written.
+
+    Attributes:
+        name: Which grid.
+        background: Its value where nothing is active.
+        bricks: `[n, 3]` where they lie.
+        active: `[n, ...]` which of their cells are active.
+        values: `[n, ...]` of all of their cells.
+    """
+
+    name: str
+    background: AnyArray
+    bricks: AnyArray
+    active: AnyArray
+    values: AnyArray
 
 
 class _Waiting:
     """Leaves of a grid that is to be written."""
 
-    def __init__(self, folder: Path, like: Field, background: Any) -> None:
-        kind = like.values.shape[4:]
-        self._background = np.array(
-            np.broadcast_to(np.asarray(background, like.values.dtype), kind)
-        )
+    def __init__(self, folder: Path, background: AnyArray, dtype: DTypeLike) -> None:
+        self._background = background
         self._bricks = [np.empty((0, 3), np.int32)]
         self._active = [np.empty((0, CELLS), bool)]
-        self._values = Scratch(folder, (CELLS, *kind), like.values.dtype)
+        self._values = Scratch(folder, (CELLS, *background.shape), dtype)
 
     def add(self, bricks: AnyArray, active: AnyArray, values: AnyArray) -> None:
         """Some more, each once."""
@@ -151,6 +179,14 @@ class _Waiting:
         self._bricks.append(bricks)
         self._active.append(active)
         self._values.append(values)
+
+    def pieces(self, name: str) -> Iterator[Piece]:
+        """All of them as pieces of a name, as they were added."""
+        first = 0
+        for bricks, active in zip(self._bricks, self._active, strict=True):
+            values = self._values[np.arange(first, first + len(bricks))]
+            yield Piece(name, self._background, bricks, active, values)
+            first += len(bricks)
 
     def grid(self, name: str, **options: Any) -> Grid:
         """All of them as a grid; see `Grid.from_leaves`."""

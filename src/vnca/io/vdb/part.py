@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from vnca.core import Box, IntArray
-from vnca.core.bricks import meeting
+from vnca.core import AnyArray, Box, IntArray
+from vnca.core.bricks import covered, meeting
 from vnca.core.field import Field
 from vnca.io.vdb.grid import MOST_TILE_CELLS, Grid
 from vnca.io.vdb.layout import LEAF_EDGE, Cursor
@@ -73,6 +73,21 @@ class GridIndex:
             meeting(self.leaves.origins // LEAF_EDGE, box).any()
             or ((at < box.upper) & (ends > box.lower)).all(axis=1).any()
         )
+
+    def count(self, box: Box) -> float:
+        """About how many active cells there are in a box."""
+        first, last = covered(self.leaves.origins // LEAF_EDGE, box)
+        share = np.prod(np.maximum(last - first, 0), axis=1) / LEAF_EDGE**3
+        tiles = self.grid.tree.tiles
+        at = tiles.origins[tiles.active].astype(np.int64)
+        ends = at + tiles.edges[tiles.active][:, None]
+        shared = np.maximum(np.minimum(ends, box.upper) - np.maximum(at, box.lower), 0)
+        return float((share * self._counts).sum() + np.prod(shared, axis=1, dtype=float).sum())
+
+    @cached_property
+    def _counts(self) -> AnyArray:
+        """`[m]` active cells of each leaf."""
+        return self.leaves.active.reshape(len(self.leaves.origins), -1).sum(axis=1)
 
     def part(self, box: Box) -> GridPart:
         """The grid as far as it meets a box.

@@ -8,6 +8,7 @@ from vnca.core.errors import OptionError
 EDGES = (768, 512, 384, 256, 192, 128, 96, 64, 48, 32)
 """Cells along a side of the tiles that are chosen from, the largest first."""
 _LIKELY_HALO = 12
+_TILES_OF_A_RANK = 4
 _CELL, _PAINTED_CELL, _REST = 350, 130, 400_000_000
 
 
@@ -53,3 +54,21 @@ def likely_edge(budget: float, *, grid: int, finer: int) -> int:
             return edge
     least = bytes_needed((EDGES[-1] + 2 * _LIKELY_HALO) ** 3, grid=1, finer=finer)
     raise OptionError(f"`memory_budget`: at least {least / 1e9:.1f}GB are needed here")
+
+
+def shared_edge(budget: float, cells: int, ranks: int, *, grid: int, finer: int) -> int:
+    """The largest tiles of which each of some ranks gets a few, and that fit its memory.
+
+    Args:
+        budget: Memory of a rank.
+        cells: Of smoke in the fullest frame, as they are in the file.
+        ranks: How many there are.
+        grid: As of `bytes_needed`, and so
+        finer: is this.
+
+    Raises:
+        OptionError: If none fit.
+    """
+    fair = (cells * grid**3 / (_TILES_OF_A_RANK * ranks)) ** (1 / 3)
+    most = likely_edge(budget, grid=grid, finer=finer)
+    return next((edge for edge in EDGES if edge <= min(fair, most)), EDGES[-1])

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from vnca.core.field import Field
 from vnca.core.marks import packed, unpacked
 from vnca.core.scratch import Scratch
 
-_BRICKS_AT_ONCE = 4096
+BRICKS_AT_ONCE = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,12 @@ class Kept:
 
     def __len__(self) -> int:
         """How many cells there are."""
-        return len(self.rows)
+        return int(self.counts.sum())
+
+    @cached_property
+    def counts(self) -> AnyArray:
+        """`[m]` cells of each brick."""
+        return unpacked(self.marks).sum(axis=(1, 2, 3))
 
     def holds(self, box: Box) -> bool:
         """Whether there may be cells in a box."""
@@ -51,15 +57,19 @@ class Kept:
 
     def pieces(self) -> Iterator[tuple[IntArray, FloatArray]]:
         """All cells and their values, some at a time."""
-        for start in range(0, len(self.bricks), _BRICKS_AT_ONCE):
-            yield self._of(np.arange(start, min(start + _BRICKS_AT_ONCE, len(self.bricks))))
+        for start in range(0, len(self.bricks), BRICKS_AT_ONCE):
+            yield self._of(np.arange(start, min(start + BRICKS_AT_ONCE, len(self.bricks))))
 
-    def _of(self, some: AnyArray) -> tuple[IntArray, FloatArray]:
-        where = unpacked(self.marks[some])
-        counts = where.sum(axis=(1, 2, 3))
+    def values_of(self, some: AnyArray) -> FloatArray:
+        """The values `[n, C]` in some of the bricks, given by their numbers."""
+        counts = self.counts[some]
         begins = np.cumsum(counts) - counts
         rows = np.repeat(self.firsts[some] - begins, counts) + np.arange(counts.sum())
-        return cells_at(self.bricks[some], where), self.rows[rows]
+        return self.rows[rows]
+
+    def _of(self, some: AnyArray) -> tuple[IntArray, FloatArray]:
+        cells = cells_at(self.bricks[some], unpacked(self.marks[some]))
+        return cells, self.values_of(some)
 
 
 @dataclass(eq=False)

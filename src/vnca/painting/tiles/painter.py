@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from vnca.painting.read import Read
 from vnca.painting.tiles import Tiling
 from vnca.painting.tiles.roll import TiledRoll
 from vnca.painting.tiles.state import TiledState
-from vnca.painting.unfinished import Unfinished
+from vnca.painting.unfinished import Source, Unfinished
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -40,15 +40,20 @@ class TiledPainter(Painter):
     @cached_property
     def tiled(self) -> TiledRoll:
         """The rule by tiles."""
-        return TiledRoll(self.roll, self.tiling, self.out, self.watch)
+        return TiledRoll(self.roll, self.tiling, self.out, self.watch, self.ranks)
 
     def _start(self) -> TiledState:
         return self.tiled.start()
 
     def _loaded(self, path: Path, *, handed_over: bool = False) -> Unfinished:
-        taken = partial(TiledState.of_stored, folder=self.out)
+        taken = partial(TiledState.of_stored, folder=self.out, ranks=self.ranks)
         conditions = self.conditions
         return Unfinished.load(path, conditions, self.roll, taken, handed_over=handed_over)
+
+    def _save(self, sources: Sequence[Source | None], state: TiledState, path: Path) -> None:
+        state = state.gathered(self.out, self.ranks)
+        if self.ranks.leads:
+            super()._save(sources, state, path)
 
     def _opened(self, frame: Frame, file: VdbFile | None) -> SmokeParts:
         return open_parts(
@@ -60,19 +65,26 @@ class TiledPainter(Painter):
 
     def _write(self, frame: Frame, read: Read, left: Unfinished) -> TiledState:
         smoke: SmokeParts = read.smoke
-        self._look(smoke, read.frame.path)
+        if self.ranks.leads:
+            self._look(smoke, read.frame.path)
         state = self.tiled.advance(smoke, left.state)
         if frame not in self.frames:
             return state
         mass = self.tiled.mass(smoke, state)
         kept = self._leaves(smoke) if isinstance(smoke, VdbSmoke) else _Whole(self, read)
+        finer = self.roll.grid * self.roll.finer
         boxes = list(kept.boxes(self.tiling.edge * self.roll.finer))
-        for number, (own, wanted) in enumerate(boxes, 1):
-            painting = self.tiled.painting(smoke, state, wanted, mass)
+        wanted = [box for _, box in boxes]
+        boxes = [boxes[number] for number in self.tiled.own(smoke, wanted, finer)]
+        near = self.tiled.around(state, [box for _, box in boxes])
+        for number, (own, box) in enumerate(boxes, 1):
+            painting = self.tiled.painting(smoke, near, box, mass)
             kept.add(own, painting.density_field, painting.colour_field, painting.emission)
             self.watch(f"frame {smoke.frame}: tile {number} of {len(boxes)} painted")
+        self.ranks.gather(kept.pieces(), kept.take)
         self._begin_to_write(frame, read, left)
-        kept.write(self.target(frame), self.provenance(read))
+        if self.ranks.leads:
+            kept.write(self.target(frame), self.provenance(read))
         return state
 
     def _look(self, smoke: SmokeParts, path: Path) -> None:
@@ -92,6 +104,9 @@ class TiledPainter(Painter):
         )
 
 
+_Part: TypeAlias = tuple[Field | None, ...]
+
+
 class _Whole:
     """A painted frame whose file is written from memory, as its smoke was read."""
 
@@ -100,7 +115,7 @@ class _Whole:
         box: Box = read.smoke.box.refined(roll.grid * roll.finer)
         self._painter, self._read = painter, read
         self._box = box if box.is_empty else box.grown(roll.beyond)
-        self._parts: list[tuple[Field | None, ...]] = []
+        self._parts: list[_Part] = []
 
     def boxes(self, edge: int) -> Iterator[tuple[Box, Box]]:
         """See `PaintedParts.boxes`."""
@@ -110,6 +125,14 @@ class _Whole:
     def add(self, own: Box, density: Field, colour: Field, emission: Field | None) -> None:
         """See `PaintedParts.add`."""
         self._parts.append(tuple(f and f.within(own) for f in (density, colour, emission)))
+
+    def pieces(self) -> Iterator[_Part]:
+        """See `PaintedParts.pieces`."""
+        return iter(self._parts)
+
+    def take(self, piece: _Part) -> None:
+        """See `PaintedParts.take`."""
+        self._parts.append(piece)
 
     def write(self, path: Path, provenance: Provenance) -> None:
         """See `PaintedParts.write`."""

@@ -1,55 +1,53 @@
 """Rolling rules over frames tile by tile: the bits of `Roll`, in the memory of a tile.
 
 The mask is a hash of a cell's coordinates and a step sees one cell far, so a tile with K cells
-around it can do K steps by itself; then those around it are fetched anew.
+around it can do K steps by itself; then those around it are fetched anew. Ranks share the tiles of
+a frame, dealt anew in each; what one needs of another's cells it fetches (`near.py`).
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from vnca.core import AnyArray, Box, FloatArray, IntArray
+from vnca.core import Box, FloatArray, IntArray
 from vnca.core.bricks import meeting
 from vnca.core.volume import Volume
-from vnca.direction import Carried, Moment
+from vnca.direction import Carried
 from vnca.direction.moment import DEEPEST, HIGHEST
 from vnca.direction.silhouette import masses, total
 from vnca.engine import open_session
 from vnca.engine.domain import Domain
 from vnca.io.painted.parts import tiles_of
 from vnca.io.parts import SmokeParts
-from vnca.painting import Painting, Ready, Roll, RollState, with_rest
+from vnca.painting import Painting, Ready, Roll, with_rest
 from vnca.painting.frames import read_ahead
 from vnca.painting.tiles import Tiling
-from vnca.painting.tiles.halo import likely_halo
+from vnca.painting.tiles.begin import (
+    BESIDE,
+    Beginning,
+    Begun,
+    carried_in,
+    frames_since,
+    in_box,
+    local_state,
+    upstream,
+    with_outside,
+)
+from vnca.painting.tiles.deal import dealt
+from vnca.painting.tiles.halo import halos, likely_halo
 from vnca.painting.tiles.kept import Keeping, Kept
+from vnca.painting.tiles.near import Near
 from vnca.painting.tiles.state import TiledState
+from vnca.ranks import Alone, Ranks
 from vnca.rule import Rule
 
-_BESIDE = 2
-"""Cells around that interpolation takes."""
-
-
-class _Begun(NamedTuple):
-    """What the cells of a frame begin with.
-
-    Attributes:
-        rule: With the weights of the frame.
-        values: Their state.
-        told: What they are conditioned on, and in a last column how many steps each does.
-        most: The most steps that one does.
-    """
-
-    rule: Rule
-    values: Kept
-    told: Kept
-    most: int
+_REACH = 8
+"""Cells around tiles whose state is fetched from other ranks before it is known what is needed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +59,14 @@ class TiledRoll:
         tiling: How frames are cut.
         folder: Where scratch files are.
         tell: Is told what is being done.
+        ranks: Who shares the tiles.
     """
 
     roll: Roll
     tiling: Tiling
     folder: Path
     tell: Callable[[str], None]
+    ranks: Ranks = field(default_factory=Alone)
     _halos: dict[int, int] = field(default_factory=dict, init=False)
 
     @property
@@ -87,17 +87,16 @@ class TiledRoll:
             GridError: If the smoke lacks what is asked for.
             OutputError: If there is no room for scratch files.
         """
-        before = (state, *state.layers)
-        begun, carried = self._begin(smoke, before)
+        begun, carried = self._begin(smoke, state)
         left = []
-        for roll, each, was in zip(self.rolls, begun, before, strict=True):
-            if each is None:
+        for roll, each, was in zip(self.rolls, begun, (state, *state.layers), strict=True):
+            if each.alive == 0:
                 left.append(TiledState(was.channels, steps_done=was.steps_done))
                 continue
             warmup = roll.config.warmup if len(was) == 0 else 0
             numbers = range(was.steps_done, was.steps_done + warmup + each.most)
             kept = self._stepped(roll, each, numbers, rest_from=was.steps_done + warmup)
-            left.append(TiledState(was.channels, kept, numbers.stop, smoke.frame))
+            left.append(TiledState(was.channels, kept, each.alive, numbers.stop, smoke.frame))
         return replace(left[0], carried=carried, layers=tuple(left[1:]))
 
     def painting(
@@ -111,42 +110,78 @@ class TiledRoll:
 
         Args:
             smoke: The frame.
-            state: After its steps.
+            state: After its steps, with the cells around the box; see `around`.
             box: The cells.
             mass: The smoke of the frame in all, as painted and before, where it is to be kept.
         """
-        roll = self.roll
-        moved = roll.config.fluff * roll.grid
-        inner = box.coarsened(roll.finer).grown(roll.colour_dilation + moved + 2 * _BESIDE)
+        roll, inner = self.roll, self._inner(box)
         aimed = roll.config.asks_for_places
-        part = self._part(smoke, inner.grown(self._sight + _BESIDE), motion=aimed)
+        part = self._part(smoke, inner.grown(self._sight + BESIDE), motion=aimed)
         moment = replace(roll.moment_of(part), carried=state.carried)
         ready, states = [], []
         for each, left in zip(self.rolls, (state, *state.layers), strict=True):
-            local = _local(left, inner)
+            local = local_state(left, inner)
             domain = Domain(local.cells, each.reached)
             ready.append(Ready(part, domain, None, each.rule_of(part)))
             states.append(local)
         return roll.painting(moment, roll.seen(ready, states, moment), state, mass or (1.0, 1.0))
+
+    def around(self, state: TiledState, boxes: Sequence[Box]) -> TiledState:
+        """A state with what `painting` takes of it in some boxes, whoever keeps that."""
+        return self._with_near(state, [self._inner(box) for box in boxes])
+
+    def own(self, smoke: SmokeParts, boxes: Sequence[Box], finer: int = 1) -> list[int]:
+        """The numbers of those of some boxes that this rank works on, as much smoke as each.
+
+        Args:
+            smoke: The frame.
+            boxes: Cubes of one size, in order; all ranks have the same.
+            finer: How many times as fine as the smoke's their cells are.
+        """
+        if self.ranks.size == 1:
+            return list(range(len(boxes)))
+        weights = [1 + smoke.count(box.coarsened(finer)) for box in boxes]
+        ranks = dealt(boxes, weights, self.ranks.size)
+        return [number for number, rank in enumerate(ranks) if rank == self.ranks.rank]
 
     def mass(self, smoke: SmokeParts, state: TiledState) -> tuple[float, float] | None:
         """How much smoke a frame has in all, as it is painted and before, where that matters."""
         roll = self.roll
         if not roll.config.keep_mass:
             return None
-        box = smoke.box.refined(roll.grid * roll.finer).grown(roll.beyond)
+        finer = roll.grid * roll.finer
+        box = smoke.box.refined(finer).grown(roll.beyond)
+        tiles = list(tiles_of(box, self.tiling.edge * roll.finer))
+        tiles = [tiles[number] for number in self.own(smoke, tiles, finer)]
+        state = self.around(state, tiles)
         now, was = [np.zeros(0)], [np.zeros(0)]
-        for tile in tiles_of(box, self.tiling.edge * roll.finer):
+        for tile in tiles:
             painting = self.painting(smoke, state, tile)
             now.append(masses(painting.density_field.within(tile)))
             was.append(masses(painting.smoke.density_field.within(tile)))
+        every = self.ranks.every((np.concatenate(now), np.concatenate(was)))
+        now, was = (list(each) for each in zip(*every, strict=True))
         return total(np.concatenate(now)), total(np.concatenate(was))
+
+    def _inner(self, box: Box) -> Box:
+        """The cells of the automaton that a box of the painting's shows."""
+        roll = self.roll
+        moved = roll.config.fluff * roll.grid
+        return box.coarsened(roll.finer).grown(roll.colour_dilation + moved + 2 * BESIDE)
+
+    def _with_near(self, state: TiledState, boxes: Sequence[Box]) -> TiledState:
+        """A state, and those of its layers, with what others keep of it in boxes."""
+        layers = tuple(self._with_near(layer, boxes) for layer in state.layers)
+        kept = state.kept
+        if kept is not None:
+            kept = Near(self.ranks, kept, boxes, self.tiling.edge).filled(kept)
+        return replace(state, kept=kept, layers=layers)
 
     @property
     def _sight(self) -> int:
         """How many cells far what is asked of a place may depend on the smoke."""
         asks = self.roll.config.asks_for_places
-        return (DEEPEST + HIGHEST + _BESIDE) * self.roll.grid if asks else 0
+        return (DEEPEST + HIGHEST + BESIDE) * self.roll.grid if asks else 0
 
     def _part(self, smoke: SmokeParts, box: Box, *, motion: bool = True) -> Volume:
         """What is in a box of the automaton's cells."""
@@ -164,84 +199,131 @@ class TiledRoll:
         tiles = tiles_of(smoke.box.refined(grid).grown(reach), self.tiling.edge)
         return [tile for tile in tiles if smoke.holds(tile.grown(reach).coarsened(grid).grown(1))]
 
-    def _begin(
-        self, smoke: SmokeParts, before: Sequence[TiledState]
-    ) -> tuple[list[_Begun | None], Carried | None]:
-        """What cells begin with under each rule, None of no cells; and what is carried along."""
+    def _begin(self, smoke: SmokeParts, before: TiledState) -> tuple[list[Begun], Carried | None]:
+        """What cells begin with under each rule; and what is carried along."""
         tiles = self._tiles(smoke)
-        keeping = [
-            (Keeping(self.folder, channels), Keeping(self.folder, width + 1))
-            for channels, width in (
-                (roll.rule.config.channels, roll.rule.config.conditioning_width)
-                for roll in self.rolls
-            )
-        ]
-        most = [0] * len(self.rolls)
-        rules = [roll.rule for roll in self.rolls]
+        tiles = [tiles[number] for number in self.own(smoke, tiles, self.roll.grid)]
+        begun = [Beginning(self.folder, roll) for roll in self.rolls]
         carried: list[Carried] = []
-        margin = max(roll.rule.config.dilation for roll in self.rolls) + self._sight + _BESIDE
+        reach, left, done = _REACH, tiles, 0
+        # Most smoke comes from near; tiles that are reached from farther wait for a second round.
+        while any(self.ranks.every(len(left))):
+            near = self._with_near(before, [tile.grown(reach) for tile in left])
+            late, widest = [], reach
+            for tile, part in self._parts(smoke, left, before):
+                far = self._begin_tile(tile, part, near, begun, carried, reach)
+                if far is not None:
+                    late.append(tile)
+                    widest = max(widest, far)
+                    continue
+                done += 1
+                self.tell(f"frame {smoke.frame}: tile {done} of {len(tiles)} begun")
+            left, reach = late, max(self.ranks.every(widest))
+        seen = np.array(self.ranks.every(smoke.seen))
+        smoke.require((float(seen[:, 0].min()), float(seen[:, 1].max())))
+        return [each.done(self.ranks) for each in begun], self._joined(carried)
+
+    def _parts(
+        self, smoke: SmokeParts, tiles: Sequence[Box], before: TiledState
+    ) -> Iterator[tuple[Box, Volume]]:
+        """Tiles with the smoke in and around them, each read while the one before is worked on."""
+        margin = max(roll.rule.config.dilation for roll in self.rolls) + self._sight + BESIDE
         parts = read_ahead(partial(self._part, smoke, tile.grown(margin)) for tile in tiles)
-        for number, (tile, part) in enumerate(zip(tiles, parts, strict=True), 1):
+        for tile, part in zip(tiles, parts, strict=True):
             while (wanted := self._motion(part, tile, before)) > margin:
                 margin = wanted
                 part = self._part(smoke, tile.grown(margin))
-            moment = self.roll.moment(part, before[0].carried)
-            if moment.carried is not None:
-                carried.append(_carried_in(moment.carried, tile))
-            for at, (roll, was) in enumerate(zip(self.rolls, before, strict=True)):
-                domain = roll.domain(part, tile)
-                if len(domain) == 0:
-                    continue
-                rules[at] = roll.rule_of(part)
-                steps = np.broadcast_to(roll.steps(moment, domain), len(domain))
-                most[at] = max(most[at], int(steps.max()))
-                ready = Ready(part, domain, None, rules[at])
-                local = _local(was, _upstream(roll, ready, was, moment))
-                values, told = keeping[at]
-                values.add(domain.cells, roll.begun(ready, local, moment)[:-1])
-                given = roll.told(ready, moment)
-                column = steps[:, None].astype(np.float32)
-                told.add(domain.cells, np.concatenate([given, column], axis=1))
-            self.tell(f"frame {smoke.frame}: tile {number} of {len(tiles)} begun")
-        smoke.require()
-        begun = [
-            _Begun(rule, values.kept(), told.kept(), steps)
-            for rule, (values, told), steps in zip(rules, keeping, most, strict=True)
-        ]
-        return [each if len(each.values) else None for each in begun], _joined(carried)
+            yield tile, part
 
-    def _motion(self, part: Volume, tile: Box, before: Sequence[TiledState]) -> int:
+    def _begin_tile(
+        self,
+        tile: Box,
+        part: Volume,
+        before: TiledState,
+        begun: Sequence[Beginning],
+        carried: list[Carried],
+        reach: int,
+    ) -> int | None:
+        """Begin with a tile; or say from how far it has to be reached, if that is not fetched."""
+        moment = self.roll.moment(part, before.carried)
+        given, far = [], 0
+        for each, was in zip(begun, (before, *before.layers), strict=True):
+            domain = each.roll.domain(part, tile)
+            if len(domain):
+                ready = Ready(part, domain, None, each.roll.rule_of(part))
+                box = upstream(each.roll, ready, was, moment)
+                far = max(far, *np.subtract(tile.lower, box.lower))
+                far = max(far, *np.subtract(box.upper, tile.upper))
+                given.append((each, was, ready, box))
+        if far > reach and self.ranks.size > 1:
+            return int(far)
+        if moment.carried is not None:
+            carried.append(carried_in(moment.carried, tile))
+        for each, was, ready, box in given:
+            each.add(ready, local_state(was, box), moment)
+        return None
+
+    def _joined(self, parts: Sequence[Carried]) -> Carried | None:
+        """What is carried in all tiles of all ranks, each of which has all of it."""
+        every = [part for found in self.ranks.every(parts) for part in found]
+        if not every:
+            return None
+        names = every[0].values
+        return Carried(
+            np.concatenate([part.cells for part in every]),
+            {name: np.concatenate([part.values[name] for part in every]) for name in names},
+        )
+
+    def _motion(self, part: Volume, tile: Box, before: TiledState) -> int:
         """How far around a tile velocity has to be known to see where smoke came from."""
         velocity = part.velocity_field
         if velocity is None:
             return 0
-        near = velocity.values[meeting(velocity.bricks, tile.grown(_BESIDE))]
+        near = velocity.values[meeting(velocity.bricks, tile.grown(BESIDE))]
         fastest = float(np.abs(near).max(initial=0))
         times = [1.0]
-        for roll, was in zip(self.rolls, before, strict=True):
-            times.append(roll.fastest * _frames(was, part))
+        for roll, was in zip(self.rolls, (before, *before.layers), strict=True):
+            times.append(roll.fastest * frames_since(was, part))
         widest = max(self.roll.reached.shape)
-        return min(math.ceil(0.5 * fastest * max(times)) + 2 * _BESIDE, widest + self.tiling.edge)
+        return min(math.ceil(0.5 * fastest * max(times)) + 2 * BESIDE, widest + self.tiling.edge)
 
-    def _stepped(self, roll: Roll, begun: _Begun, numbers: range, *, rest_from: int) -> Kept:
+    def _stepped(self, roll: Roll, begun: Begun, numbers: range, *, rest_from: int) -> Kept:
         """The state after the steps of some numbers; from one of them on, cells may rest."""
         state, told = begun.values, begun.told
         if not numbers:
             return state
-        tiles = [box for box in tiles_of(roll.reached, self.tiling.edge) if state.holds(box)]
-        halo = self.tiling.halo or self._halos.get(len(numbers))
-        if halo is None:
-            halo = self._halos[len(numbers)] = likely_halo(state, tiles, len(numbers))
-        rounds = max(1, -(-len(numbers) // halo))
-        ends = [numbers.start + len(numbers) * end // rounds for end in range(rounds + 1)]
+        edge, count = self.tiling.edge, len(numbers)
+        tiles = [box for box in tiles_of(roll.reached, edge) if state.holds(box)]
+        rounds = max(1, -(-count // self._halo(state, tiles, count)))
+        ends = [numbers.start + count * end // rounds for end in range(rounds + 1)]
+        widest = max(end - begin for begin, end in pairwise(ends))
+        near = Near(self.ranks, state, [tile.grown(widest) for tile in tiles], edge)
+        told = near.filled(told)
+        # What others send comes while the tiles are computed that do not wait for it.
+        tiles.sort(key=lambda tile: near.touches(tile.grown(widest)))
         for begin, end in pairwise(ends):
             after = Keeping(self.folder, roll.rule.config.channels)
+            coming = near.begin(state)
             for number, tile in enumerate(tiles, 1):
+                if near.touches(tile.grown(widest)):
+                    state = coming.wait()
                 given = state, told, tile, range(begin, end), rest_from
                 after.add(*self._block(roll, begun.rule, *given))
-                self.tell(f"step {end - numbers.start} of {len(numbers)}, tile {number}")
+                coming.poll()
+                self.tell(f"step {end - numbers.start} of {count}, tile {number}")
+            coming.wait()
             state = after.kept()
         return state
+
+    def _halo(self, state: Kept, tiles: Sequence[Box], steps: int) -> int:
+        """How many cells around tiles they are given, the same on all ranks."""
+        if self.tiling.halo is not None:
+            return self.tiling.halo
+        if steps not in self._halos:
+            wide = [tile.grown(halos(steps)[-1]) for tile in tiles]
+            known = Near(self.ranks, state, wide, self.tiling.edge).known
+            self._halos[steps] = likely_halo(known, tiles, steps, self.ranks)
+        return self._halos[steps]
 
     def _block(
         self,
@@ -266,63 +348,10 @@ class TiledRoll:
         )
         fewest = rest_from + int(steps.min(initial=len(numbers)))
         together = range(numbers.start, max(numbers.start, min(numbers.stop, fewest)))
-        begun = [_with_outside(values)]
+        begun = [with_outside(values)]
         del values  # nor has what they begin with a name, or it would be kept to the last step
         stepped = session.run(session.upload(begun.pop()), together)
         for number in range(together.stop, numbers.stop):
             stepped = with_rest(session, stepped, number, rest=steps <= number - rest_from)
-        inside = _in(cells, tile)
+        inside = in_box(cells, tile)
         return cells[inside], session.read(stepped)[:-1][inside]
-
-
-def _upstream(roll: Roll, ready: Ready, was: TiledState, moment: Moment) -> Box:
-    """The cells from which those of a tile may have their state."""
-    low = ready.domain.cells.min(axis=0).astype(float)
-    high = ready.domain.cells.max(axis=0) + 1.0
-    velocity = ready.smoke.velocity_field
-    if velocity is not None and len(was):
-        speed = roll.pattern_speed(moment, ready.domain)
-        times = np.array([[np.min(speed)], [np.max(speed)]], float) * _frames(was, ready.smoke)
-        moving = velocity.values.reshape(-1, 3)
-        ends = [moving.min(axis=0, initial=0), moving.max(axis=0, initial=0)]
-        moved = np.concatenate([times * end for end in ends])
-        low -= np.maximum(moved.max(axis=0), 0)
-        high -= np.minimum(moved.min(axis=0), 0)
-    lower = np.maximum(np.floor(low) - _BESIDE, roll.reached.lower).astype(int).tolist()
-    upper = np.minimum(np.ceil(high) + _BESIDE, roll.reached.upper).astype(int).tolist()
-    return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
-
-
-def _frames(was: TiledState, smoke: Volume) -> int:
-    """For how many frames smoke has moved since a state."""
-    return 1 if was.frame is None else max(1, smoke.frame - was.frame)
-
-
-def _local(state: TiledState, box: Box) -> RollState:
-    """A state in a box."""
-    if state.kept is None:
-        return replace(RollState.empty(state.channels, state.steps_done), frame=state.frame)
-    cells, values = state.kept.within(box)
-    return RollState(cells, _with_outside(values), state.steps_done, state.frame)
-
-
-def _with_outside(values: FloatArray) -> FloatArray:
-    return np.concatenate([values, np.zeros((1, values.shape[1]), values.dtype)])
-
-
-def _in(cells: AnyArray, box: Box) -> AnyArray:
-    return np.asarray(((cells >= box.lower) & (cells < box.upper)).all(axis=1))
-
-
-def _carried_in(carried: Carried, box: Box) -> Carried:
-    own = _in(carried.cells, box)
-    return Carried(carried.cells[own], {n: values[own] for n, values in carried.values.items()})
-
-
-def _joined(parts: Sequence[Carried]) -> Carried | None:
-    """What is carried in all tiles."""
-    if not parts:
-        return None
-    cells = np.concatenate([part.cells for part in parts])
-    names = parts[0].values
-    return Carried(cells, {n: np.concatenate([part.values[n] for part in parts]) for n in names})
