@@ -120,17 +120,35 @@ def test_what_ranks_cannot_do_is_refused_in_one_line(
     assert not (tmp_path / "out").exists()
 
 
+BROKEN = """
+import sys
+from vnca.cli import main
+from vnca.core.errors import OutputError
+from vnca.painting.tiles.roll import TiledRoll
+
+begin = TiledRoll._begin_tile
+
+def broken(self, *given):
+    if self.ranks.rank == 2:
+        raise OutputError("scratch: no room")
+    return begin(self, *given)
+
+TiledRoll._begin_tile = broken
+sys.exit(main())
+"""
+
+
 def test_what_one_rank_finds_is_told_once(
-    mpirun: Any, model: Path, smoke: Path, tmp_path: Path
+    command: Any, model: Path, smoke: Path, tmp_path: Path
 ) -> None:
-    path = smoke / "ball_0002.vdb"
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2 : len(data) // 2 + 400] = bytes(400)
-    path.write_bytes(data)
-    done = mpirun(3, "stylize", model, smoke, "--out", tmp_path / "out", *QUICK, "--tile", 8)
+    words = command(3, "stylize", model, smoke, "--out", tmp_path / "out", *QUICK, "--tile", 8)
+    at = words.index("-m")
+    words[at : at + 2] = ["-c", BROKEN]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=300)
     assert done.returncode == 2
     assert done.stderr.count("vnca: ") == 1
-    assert "ball_0002.vdb" in done.stderr
+    assert "vnca: scratch: no room" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_mpirun_without_mpi4py_is_refused(vnca: Any, model: Path, monkeypatch: Any) -> None:
