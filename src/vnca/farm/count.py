@@ -128,7 +128,7 @@ def exchanged(alive: Field, tile: int, halo: int) -> Exchange:
     ghosts, pairs = np.zeros(len(tiles)), set()
     for step in OFFSETS[OFFSETS.any(axis=1)]:
         reached = own + step
-        share = _shared(lowest, reached * tile, tile, halo)
+        share = shared_part(lowest, reached * tile, tile, halo)
         for brick in np.flatnonzero((share > 0) & (counts > 0)):
             to = known.get(tuple(reached[brick].tolist()))
             if to is not None:
@@ -143,7 +143,7 @@ def exchanged(alive: Field, tile: int, halo: int) -> Exchange:
     )
 
 
-def _shared(lowest: AnyArray, tiles: AnyArray, tile: int, halo: int) -> AnyArray:
+def shared_part(lowest: AnyArray, tiles: AnyArray, tile: int, halo: float) -> AnyArray:
     """Which part of bricks lies in the ghost zones of tiles, each by its lowest cell, `[m]`."""
     low = np.maximum(lowest, tiles - halo)
     high = np.minimum(lowest + EDGE, tiles + tile + halo)

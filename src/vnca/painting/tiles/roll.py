@@ -6,6 +6,7 @@ a frame, dealt anew in each; what one needs of another's cells it fetches (`near
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -60,6 +61,8 @@ class TiledRoll:
         folder: Where scratch files are.
         tell: Is told what is being done.
         ranks: Who shares the tiles.
+        worked: Cells times steps that this rank has done, of its tiles (own) and with those around
+            (all).
     """
 
     roll: Roll
@@ -67,6 +70,7 @@ class TiledRoll:
     folder: Path
     tell: Callable[[str], None]
     ranks: Ranks = field(default_factory=Alone)
+    worked: Counter[str] = field(default_factory=Counter, init=False)
     _halos: dict[int, int] = field(default_factory=dict, init=False)
 
     @property
@@ -354,4 +358,5 @@ class TiledRoll:
         for number in range(together.stop, numbers.stop):
             stepped = with_rest(session, stepped, number, rest=steps <= number - rest_from)
         inside = in_box(cells, tile)
+        self.worked.update(own=int(inside.sum()) * len(numbers), all=len(cells) * len(numbers))
         return cells[inside], session.read(stepped)[:-1][inside]
