@@ -3,18 +3,18 @@
     python benchmarks/ranks.py measure build/ranks --csv benchmarks/results/ranks.csv
     python benchmarks/ranks.py simulate build/ranks SMOKE.vdb --cells 1e9
 
-`measure` paints a made column of smoke with 1 to 4 ranks, threads of one program: the same smoke for
-all (strong), and as much for each (weak). Seconds are those that the processor spent on a rank, so
-they hold on a machine that does other things, too; they do not tell what waiting would cost. What
-is counted is exact: cells times steps, messages and bytes. The costs of a cell are kept in the
-folder, and `simulate` takes them to 64 to 4096 ranks, on the smoke of a file enlarged to so many
-cells. docs/guide/large.md states what it assumes.
+`measure` paints a made column of smoke with 1 to 4 ranks, threads of one program: the same smoke
+for all (strong), and as much for each (weak). Seconds are those that the processor spent on a rank,
+so they hold on a machine that does other things, too; they do not tell what waiting would cost.
+Cells times steps, messages and bytes are exact; those of all but the first rank hold the painted
+leaves, too, which the first gathers. The costs of a cell are kept in the folder, and `simulate`
+takes them to 64 to 4096 ranks, on the smoke of a file enlarged to so many cells;
+docs/guide/large.md states what it assumes.
 """
 
 import argparse
 import csv
 import json
-import math
 import subprocess
 import sys
 import time
@@ -29,8 +29,8 @@ import numpy as np
 from vnca.core import AnyArray
 from vnca.core.bricks import EDGE
 from vnca.engine import Compute
-from vnca.engine.automaton import OFFSETS
-from vnca.farm.count import active_cells, around, shared_part
+from vnca.farm.count import active_cells, around
+from vnca.farm.exchange import Shares, shared_out
 from vnca.io import SmokeFormat
 from vnca.io.painted.parts import PaintedParts
 from vnca.io.parts import VdbSmoke, open_parts
@@ -39,7 +39,6 @@ from vnca.io.smoke_format import CELLS_PER_FRAME
 from vnca.io.vdb import open_vdb
 from vnca.painting import Roll, StylizeConfig
 from vnca.painting.tiles import Tiling
-from vnca.painting.tiles.deal import dealt
 from vnca.painting.tiles.roll import TiledRoll
 from vnca.ranks import Ranks
 from vnca.ranks.threads import together
@@ -55,6 +54,12 @@ SMOKE = SmokeFormat(velocity_units=CELLS_PER_FRAME)
 STEPS, WARMUP, FRAMES, TILE, HALO = 8, 8, 2, 32, 4
 LATENCY, BANDWIDTH = 2e-6, 10e9
 """Seconds until a message arrives, and bytes a second of a rank: what an InfiniBand network has."""
+AGREED = 12
+"""How often all ranks tell each other small values in a frame."""
+SIMULATED = (
+    *("ranks", "tiles", "most/mean", "computed", "MB/round", "messages", "wait ms", "busy s"),
+    "of ideal",
+)
 COSTS = "costs.json"
 
 
@@ -186,81 +191,38 @@ def simulate(options: argparse.Namespace) -> None:
     rule = load_style("ink").rule.config
     active, _, _ = active_cells(Frame(1, options.smoke), SmokeFormat())
     alive = around(active, rule.dilation)
-    counts = alive.values.reshape(len(alive.values), -1).sum(axis=1).astype(float)
-    scale = (options.cells / counts.sum()) ** (1 / 3)
-    steps, halo = rule.steps_per_frame, options.halo
-    rounds = -(-steps // halo)
-    cell = 4 * rule.channels
-    print(f"{options.cells:.3g} cells, {steps} steps a frame, {halo} cells around a tile")
-    print("ranks  tiles  busiest/mean  ghosts/own  computed/own  MB/round  messages  s/frame  eff.")
-    first = None
-    for size in (64, 256, 1024, 4096):
-        edge = fair_edge(counts.sum() / size, options.tiles)
-        own = alive.bricks.astype(np.int64) * EDGE // edge
-        tiles, row = np.unique(own, axis=0, return_inverse=True)
-        row = row.reshape(-1)
-        inside = np.bincount(row, counts)
-        boxes = [replace_box(at, edge) for at in tiles.tolist()]
-        ranks = np.array(dealt(boxes, inside.tolist(), size))
-        ghosts, foreign, pairs = ghosts_of(alive.bricks, counts, tiles, ranks, edge, halo / scale)
-        volume = scale**3
-        mine = np.bincount(ranks, inside, size) * volume
-        again = np.bincount(ranks, ghosts, size) * volume
-        coming = np.bincount(ranks, foreign, size) * volume
-        beside = np.bincount(pairs[:, 0], minlength=size) if len(pairs) else np.zeros(size)
-        # As many cells around are computed in each of a round's steps: those not needed any more
-        # are not left out.
-        compute = cost["step"] * steps * (mine + again)
-        sending = rounds * (coming * cell / BANDWIDTH + 2 * beside * LATENCY)
-        inner = np.bincount(ranks, inside * (foreign == 0), size) * volume
-        waiting = np.maximum(0, sending - cost["step"] * steps * inner)
-        agreeing = 12 * (math.log2(size) * LATENCY + len(tiles) * 24 / BANDWIDTH)
-        busy = mine * (cost["begin"] + cost["paint"]) + compute + waiting + agreeing
-        writing = options.cells * (cost["write"] + cost["file"] / BANDWIDTH)
-        seconds = max(busy.max(), writing)
-        first = first or (size * seconds)
-        print(
-            f"{size:5}  {len(tiles):5}  {mine.max() / mine.mean():12.2f}  "
-            f"{coming.sum() / mine.sum():10.1%}  {1 + again.sum() / mine.sum():12.2f}  "
-            f"{coming.max() * cell / 1e6:8.1f}  {beside.max():8.0f}  {busy.max():7.2f}  "
-            f"{first / (size * busy.max()):4.0%}"
-        )
+    count, cell = int(alive.values.sum()), 4 * rule.channels
+    volume = options.cells / count
+    steps, rounds = rule.steps_per_frame, -(-rule.steps_per_frame // options.halo)
+    halo = options.halo / volume ** (1 / 3)
+    writing = options.cells * (cost["write"] + cost["file"] / BANDWIDTH)
+    print(f"{options.cells:.3g} cells, {steps} steps a frame, {options.halo} cells around a tile")
     print(f"the first rank writes a frame in {writing:.0f} s")
+    print(" ".join(f"{word:>9}" for word in SIMULATED))
+    for size in (64, 256, 1024, 4096):
+        edge = max(EDGE, int((count / size / options.tiles) ** (1 / 3)) // EDGE * EDGE)
+        shares = shared_out(alive, edge, halo, size)
 
+        def of_ranks(values: AnyArray, shares: Shares = shares) -> AnyArray:
+            return shares.of_ranks(values) * volume
 
-def fair_edge(cells: float, tiles: int) -> int:
-    """The edge of tiles of which a rank gets about so many, as they are in the file."""
-    return max(EDGE, int((cells / tiles) ** (1 / 3)) // EDGE * EDGE)
-
-
-def replace_box(at: list[int], edge: int) -> Any:
-    from vnca.core import Box
-
-    x, y, z = at
-    return Box((x, y, z), (x + 1, y + 1, z + 1)).refined(edge)
-
-
-def ghosts_of(
-    bricks: AnyArray, counts: AnyArray, tiles: AnyArray, ranks: AnyArray, edge: int, halo: float
-) -> tuple[AnyArray, AnyArray, AnyArray]:
-    """Cells around tiles, those of them that other ranks keep, and who sends to whom."""
-    known = {tuple(at): number for number, at in enumerate(tiles.tolist())}
-    lowest = bricks.astype(np.int64) * EDGE
-    ghosts, foreign = np.zeros(len(tiles)), np.zeros(len(tiles))
-    pairs: set[tuple[int, int]] = set()
-    for step in OFFSETS[OFFSETS.any(axis=1)]:
-        reached = lowest // edge + step
-        share = shared_part(lowest, reached * edge, edge, halo)
-        for brick in np.flatnonzero((share > 0) & (counts > 0)):
-            to = known.get(tuple(reached[brick].tolist()))
-            if to is None:
-                continue
-            ghosts[to] += counts[brick] * share[brick]
-            of = known[tuple((lowest[brick] // edge).tolist())]
-            if ranks[of] != ranks[to]:
-                foreign[to] += counts[brick] * share[brick]
-                pairs.add((int(ranks[to]), int(ranks[of])))
-    return ghosts, foreign, np.array(sorted(pairs), int).reshape(-1, 2)
+        own, again = of_ranks(shares.cells), of_ranks(shares.around)
+        foreign = of_ranks(shares.foreign)
+        inner = of_ranks(shares.cells * (shares.foreign == 0))
+        messages = np.bincount(shares.pairs[:, 0], minlength=len(own))
+        stepping = cost["step"] * steps * (own + again)
+        sending = rounds * (foreign * cell / BANDWIDTH + messages * LATENCY)
+        waiting = np.maximum(0, sending - cost["step"] * steps * inner)
+        telling = AGREED * (np.log2(size) * LATENCY + 24 * len(shares.cells) / BANDWIDTH)
+        busy = (cost["begin"] + cost["paint"]) * own + stepping + waiting + telling
+        ideal = (cost["begin"] + cost["paint"] + cost["step"] * steps) * options.cells / size
+        row = (
+            *(f"{size}", f"{len(shares.cells)}", f"{own.max() / own.mean():.2f}"),
+            *(f"{1 + again.sum() / own.sum():.2f}", f"{foreign.max() * cell / 1e6:.1f}"),
+            *(f"{messages.max()}", f"{waiting.max() * 1e3:.2f}"),
+            *(f"{busy.max():.2f}", f"{ideal / busy.max():.0%}"),
+        )
+        print(" ".join(f"{word:>9}" for word in row))
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from vnca.farm.plan import Costs, Line
+from vnca.painting.tiles import bytes_needed
 from vnca.rule.model import MODEL_NAME
 
 Vnca = Callable[..., Any]
@@ -62,21 +63,27 @@ def test_what_cannot_be_is_said_in_one_line(
 
 @pytest.fixture
 def known_costs(monkeypatch: pytest.MonkeyPatch) -> None:
-    costs = Costs(1.0, Line(0.5, 1e-4), Line(1e8, 1000), Line(1e4, 10))
+    costs = Costs(Line(1.0, 0.0), Line(0.5, 1e-4), Line(1e4, 10))
     monkeypatch.setattr("vnca.cli.farm.measured_costs", lambda *_, **__: costs)
 
 
 @pytest.mark.usefixtures("known_costs")
 def test_a_plan_is_printed(vnca: Vnca, model: Path, smoke: Path) -> None:
-    outcome = vnca("plan", smoke, "--model", model, "--machines", 2, "--tile", 8)
+    outcome = vnca("plan", smoke, "--model", model, "--machines", 2, "--tile", 8, "--ranks", 3)
     assert outcome.code == 0
     assert re.match(r"3 frames, at most [\d,]+ cells of the automaton \(frame 1\)", outcome.out)
-    for word in ("time ", "on 2 like it", "memory  0.10 GB", "disk ", "every 4 steps, 4 times a"):
+    for word in ("time ", "on 2 like it", "memory  0.19 GB", "disk ", "each 4 steps", "3 ranks, 4"):
         assert word in outcome.out
     told = json.loads(vnca("plan", smoke, "--model", model, "--tile", 8, "--json").out)
     assert [frame["frame"] for frame in told["frames"]] == [1, 2, 3]
     assert told["exchange"]["tiles"] > 1
-    assert told["plan"]["memory"] == round(1e8 + 1000 * told["frames"][0]["cells"])
+    smoke_cells = min(told["frames"][0]["smoke"], told["exchange"]["largest"])
+    assert told["plan"]["memory"] == bytes_needed(smoke_cells, grid=1, finer=1)
+
+
+def test_ranks_of_a_plan_need_tiles(vnca: Vnca, model: Path, smoke: Path) -> None:
+    complaint = vnca("plan", smoke, "--model", model, "--ranks", 2).complaint
+    assert "--ranks: share tiles; give --tile, too" in complaint
 
 
 def test_costs_are_measured_once_and_kept(
@@ -87,7 +94,7 @@ def test_costs_are_measured_once_and_kept(
     first = vnca("plan", smoke, "--model", model, "--json")
     assert "measuring what a cell costs" in first.err
     costs = json.loads(first.out)["costs"]
-    assert costs["memory"]["least"] > 1e7
+    assert costs["begin"]["least"] > 0
     assert costs["disk"]["a_cell"] > 0
     assert [path.name[:6] for path in (tmp_path / "cache").iterdir()] == ["costs_"]
     again = vnca("plan", smoke, "--model", model / MODEL_NAME, "--json")

@@ -12,7 +12,8 @@ from vnca.core import Box
 from vnca.core.field import Field
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
-from vnca.farm.count import Count, active_cells, around, counted, exchanged
+from vnca.farm.count import Count, active_cells, around, counted
+from vnca.farm.exchange import exchanged
 from vnca.farm.plan import Costs, Line, planned
 from vnca.io import SmokeFormat, read_smoke, write_smoke
 from vnca.io.sequence import Frame, find_frames
@@ -105,19 +106,29 @@ def test_what_tiles_exchange_is_what_lies_in_their_ghost_zones(tile: int, halo: 
     assert found.messages == messages
 
 
-COSTS = Costs(2.0, Line(1.0, 0.5), Line(100, 2), Line(10, 3))
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks_tell_each_other_only_what_others_keep(ranks: int) -> None:
+    full = Field.from_dense(np.ones((32, 24, 48), bool), (0, 0, 0), outside=False)
+    alone, shared = exchanged(full, 8, 3), exchanged(full, 8, 3, ranks)
+    assert exchanged(full, 8, 3, 1).ghosts == 0
+    assert 0 < shared.ghosts < alone.ghosts == alone.around == shared.around
+    assert shared.messages <= ranks * (ranks - 1)
+    assert shared.cells / ranks <= shared.busiest <= 1.2 * shared.cells / ranks
+
+
+COSTS = Costs(Line(20.0, 0.6), Line(1.0, 0.5), Line(10, 3))
 
 
 def test_a_plan_adds_up() -> None:
     counts = [Count(frame, 5, cells, 7) for frame, cells in ((1, 10), (2, 20), (3, 20), (4, 30))]
-    whole = planned(counts, COSTS, warmup=4)
-    seconds = 2 + 4 * 6 + 6 + 11 + 11 + 16
+    whole = planned(counts, COSTS, memory=160)
+    seconds = 20 + 6 + 6 + 11 + 11 + 16
     assert whole.seconds == whole.elapsed == seconds
-    assert whole.memory == 100 + 2 * 30
+    assert whole.memory == 160
     assert whole.disk == 4 * 10 + 3 * 80 + 4 * 7
-    two = planned(counts, COSTS, warmup=4, machines=2, chunk=2, preroll=1)
-    assert two.elapsed == max(2 + 4 * 6 + 17, 2 + 4 * 11 + 11 + 27)
-    exact = planned(counts, COSTS, warmup=4, machines=2, chunk=2, preroll=None)
+    two = planned(counts, COSTS, memory=160, machines=2, chunk=2, preroll=1)
+    assert two.elapsed == max(20 + 6 + 17, 20 + 12 + 11 + 27)
+    exact = planned(counts, COSTS, memory=160, machines=2, chunk=2, preroll=None)
     assert exact.elapsed == seconds
 
 

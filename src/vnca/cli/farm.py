@@ -13,12 +13,13 @@ from vnca.cli.terminal import Terminal, clock, made
 from vnca.core.errors import OptionError
 from vnca.core.files import writable_file
 from vnca.direction.shot import Shot
-from vnca.farm.count import active_cells, around, counted, exchanged
+from vnca.farm.count import active_cells, around, counted
+from vnca.farm.exchange import exchanged
 from vnca.farm.formats import Format, write_job
 from vnca.farm.plan import measured_costs, planned
 from vnca.farm.shots import Chunks, shots_job
 from vnca.io import SmokeFormat
-from vnca.painting import StylizeConfig
+from vnca.painting.tiles import bytes_needed
 from vnca.recipe.sequence import open_sequence, sequence_region
 from vnca.rule.library import load_style
 from vnca.rule.model import Model
@@ -152,9 +153,11 @@ class Plan:
     preroll: int | None = None
     """Frames that are stepped through before a chunk; all of them unless given."""
     tile: int | None = None
-    """Tell what tiles of so many cells along an edge exchange, if they share a frame."""
+    """Paint by tiles of so many cells along an edge: memory is theirs."""
     halo: int = 4
     """Cells of the ghost zone of a tile: steps between two exchanges."""
+    ranks: int | None = None
+    """Ranks of MPI that share the tiles: tells what they send each other."""
     again: bool = False
     """Measure the costs again."""
     json: bool = False
@@ -166,8 +169,10 @@ class Plan:
         require_refinement(self.refine)
         if (self.model is None) == (self.style is None):
             raise OptionError("`model`, `style`: expected one of them")
-        for name in ("machines", "chunk_size", "halo"):
-            if getattr(self, name) < 1:
+        if self.ranks is not None and self.tile is None:
+            raise OptionError("`ranks`: share tiles; give `tile`, too")
+        for name in ("machines", "chunk_size", "halo", "ranks"):
+            if (getattr(self, name) or 1) < 1 or getattr(self, name) == 0:
                 raise OptionError(f"`{name}` {getattr(self, name)}: at least 1 is needed")
         if self.preroll is not None and self.preroll < 0:
             raise OptionError(f"`preroll` {self.preroll}: must not be negative")
@@ -188,25 +193,30 @@ def run_plan(arguments: Sequence[str]) -> None:
     kind = config.domain
     counts = list(counted(sequence, options.smoke, region, config.dilation, kind))
     costs = measured_costs(model, options.refine, watch, again=options.again)
+    exchange = None
+    finer = model.rule.decoder is not None
+    sizes = {"grid": 1 if finer else options.refine, "finer": options.refine if finer else 1}
+    most_smoke = max(count.smoke for count in counts)
+    if options.tile is not None:
+        fullest = max(zip(counts, sequence, strict=True), key=lambda each: each[0].cells)[1]
+        active, _, _ = active_cells(fullest, options.smoke)
+        alive = around(active, config.dilation)
+        exchange = exchanged(alive, options.tile, options.halo, options.ranks)
+        most_smoke = min(most_smoke, exchange.largest)
     plan = planned(
         counts,
         costs,
-        warmup=StylizeConfig().warmup / config.steps_per_frame,
+        memory=bytes_needed(most_smoke, **sizes),
         machines=options.machines,
         chunk=options.chunk_size if options.machines > 1 else 0,
         preroll=options.preroll,
     )
-    exchange = None
-    if options.tile is not None:
-        fullest = max(zip(counts, sequence, strict=True), key=lambda each: each[0].cells)[1]
-        active, _, _ = active_cells(fullest, options.smoke)
-        exchange = exchanged(around(active, config.dilation), options.tile, options.halo)
     rounds = -(-config.steps_per_frame // options.halo)
     if options.json:
         told: dict[str, Any] = {"frames": [count._asdict() for count in counts]}
         told |= {"costs": asdict(costs), "plan": asdict(plan)}
         if exchange is not None:
-            told["exchange"] = asdict(exchange) | {"rounds": rounds}
+            told["exchange"] = exchange._asdict() | {"rounds": rounds}
         print_json(told)
         return
     most, mean = max(counts, key=lambda c: c.cells), sum(c.cells for c in counts) / len(counts)
@@ -225,8 +235,12 @@ def run_plan(arguments: Sequence[str]) -> None:
         sent = exchange.ghosts * config.channels * 4
         print(
             f"tiles   {exchange.tiles} of {options.tile}³ cells, the largest with "
-            f"{exchange.largest:,} of them, ghosts included; every {options.halo} steps, "
-            f"{rounds} times a frame, {exchange.messages} messages of {sent / 1e6:.1f} MB "
-            "together; "
-            f"{exchange.ghosts / exchange.cells:.0%} more cells at the beginning of each"
+            f"{exchange.largest:,} of them, ghosts included; "
+            f"{exchange.around / exchange.cells:.0%} more cells at the beginning of each "
+            f"{options.halo} steps"
+        )
+        whose = "tiles" if options.ranks is None else f"{exchange.ranks} ranks"
+        print(
+            f"ranks   between {whose}, {rounds} times a frame, {exchange.messages} messages of "
+            f"{sent / 1e6:.1f} MB together; the busiest has {exchange.busiest:,} cells"
         )

@@ -2,16 +2,13 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from vnca.core import AnyArray
-from vnca.core.bricks import EDGE
 from vnca.core.field import Field, dilated
 from vnca.core.lattice import Region
-from vnca.engine.automaton import OFFSETS
 from vnca.engine.domain import DomainKind
 from vnca.io import SmokeFormat, read_smoke
 from vnca.io.sequence import Frame, FrameSequence
@@ -89,62 +86,3 @@ def active_cells(frame: Frame, smoke: SmokeFormat) -> tuple[Field, float, int]:
 def around(active: Field, dilation: int) -> Field:
     """Cells at most `dilation` cells along each axis from one that is active."""
     return dilated(replace(active, box=active.box.grown(dilation)), dilation)
-
-
-@dataclass(frozen=True)
-class Exchange:
-    """What tiles of a frame with ghost zones tell each other.
-
-    Attributes:
-        tiles: Tiles with cells.
-        messages: From a tile to one beside it, each time ghost zones are filled.
-        ghosts: Cells that are sent each time.
-        largest: Cells of the largest tile, with its ghost zone.
-        cells: Cells of all tiles, without.
-    """
-
-    tiles: int
-    messages: int
-    ghosts: int
-    largest: int
-    cells: int
-
-
-def exchanged(alive: Field, tile: int, halo: int) -> Exchange:
-    """What tiles of so many cells along an edge exchange; cells of a brick are taken as spread.
-
-    Args:
-        alive: Cells of the automaton.
-        tile: Cells along the edge of a tile, a multiple of 8.
-        halo: Cells of a ghost zone, at most those of a tile: as many steps are done between two
-            exchanges.
-    """
-    counts = alive.values.reshape(len(alive.values), -1).sum(axis=1)
-    lowest = alive.bricks.astype(np.int64) * EDGE
-    own = lowest // tile
-    tiles, row = np.unique(own, axis=0, return_inverse=True)
-    known = {tuple(at): number for number, at in enumerate(tiles.tolist())}
-    inside = np.bincount(row.reshape(-1), counts, len(tiles))
-    ghosts, pairs = np.zeros(len(tiles)), set()
-    for step in OFFSETS[OFFSETS.any(axis=1)]:
-        reached = own + step
-        share = shared_part(lowest, reached * tile, tile, halo)
-        for brick in np.flatnonzero((share > 0) & (counts > 0)):
-            to = known.get(tuple(reached[brick].tolist()))
-            if to is not None:
-                ghosts[to] += counts[brick] * share[brick]
-                pairs.add((int(row.reshape(-1)[brick]), to))
-    return Exchange(
-        len(tiles),
-        len(pairs),
-        round(ghosts.sum()),
-        round((inside + ghosts).max()),
-        int(counts.sum()),
-    )
-
-
-def shared_part(lowest: AnyArray, tiles: AnyArray, tile: int, halo: float) -> AnyArray:
-    """Which part of bricks lies in the ghost zones of tiles, each by its lowest cell, `[m]`."""
-    low = np.maximum(lowest, tiles - halo)
-    high = np.minimum(lowest + EDGE, tiles + tile + halo)
-    return np.maximum(high - low, 0).prod(axis=1) / EDGE**3

@@ -2,7 +2,8 @@
 
 Cells are counted in the files' headers (`count.py`). What a cell costs is measured on this machine:
 two small sequences of different sizes are painted by the very program, with the same model, and a
-line is drawn through each of time, memory and disk. The costs are kept in the cache.
+line is drawn through each of time and disk. The costs are kept in the cache. Memory is what tiles
+are chosen by, too (`bytes_needed`).
 """
 
 import hashlib
@@ -57,15 +58,14 @@ class Costs:
     """What a frame costs on a machine, by cells of the automaton on the grid of the smoke.
 
     Attributes:
-        begin: Seconds before the first frame is begun.
+        begin: Seconds that the first frame takes beyond those of a frame: until the program is
+            there, and for the steps before it is painted.
         seconds: Of a frame.
-        memory: Bytes, at most at a time.
         disk: Bytes that are written, without what is copied.
     """
 
-    begin: float
+    begin: Line
     seconds: Line
-    memory: Line
     disk: Line
 
 
@@ -79,11 +79,8 @@ def measured_costs(model: Model, refine: int, watch: Watch, *, again: bool = Fal
         again: Measure again.
 
     Raises:
-        OptionError: If this machine does not tell how much memory a program has taken, or the
-            painting fails.
+        OptionError: If the painting fails.
     """
-    if not hasattr(os, "wait4"):
-        raise OptionError("vnca plan: this machine does not tell what memory a program has taken")
     rule = model.rule
     what = [
         vnca.__version__,
@@ -102,9 +99,8 @@ def measured_costs(model: Model, refine: int, watch: Watch, *, again: bool = Fal
     found = [_trial(model, radius, refine) for radius in radii]
     cells = [trial.cells for trial in found]
     costs = Costs(
-        max(0.0, found[0].begin),
+        Line.through(cells, [trial.begin for trial in found]),
         Line.through(cells, [trial.seconds for trial in found]),
-        Line.through(cells, [trial.memory for trial in found]),
         Line.through(cells, [trial.disk for trial in found]),
     )
     with whole_file(path) as temporary:
@@ -115,8 +111,7 @@ def measured_costs(model: Model, refine: int, watch: Watch, *, again: bool = Fal
 def _kept(path: Path) -> Costs | None:
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
-        lines = {name: Line(**told[name]) for name in ("seconds", "memory", "disk")}
-        return Costs(begin=float(told["begin"]), **lines)
+        return Costs(**{name: Line(**told[name]) for name in ("begin", "seconds", "disk")})
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
@@ -126,7 +121,6 @@ class _Trial:
     cells: int
     begin: float
     seconds: float
-    memory: float
     disk: float
 
 
@@ -148,13 +142,9 @@ def _trial(model: Model, radius: int, refine: int) -> _Trial:
         words = [sys.executable, "-m", "vnca", "stylize", name, str(folder)]
         words += ["--out", str(out), "--refine", str(refine), "--velocity-units", "cells/frame"]
         begun = time.time()
-        with subprocess.Popen(words, stderr=subprocess.PIPE) as process:
-            assert process.stderr is not None, "it is a pipe"
-            said = process.stderr.read().decode(errors="replace")
-            _, status, usage = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            raise OptionError(f"vnca plan: painting a trial failed: {' '.join(said.split())}")
+        done = subprocess.run(words, stderr=subprocess.PIPE, text=True, errors="replace")
+        if done.returncode:
+            raise OptionError(f"vnca plan: a trial failed: {' '.join(done.stderr.split())}")
         painted = sorted(out.glob("*.vdb"))
         ends = [path.stat().st_mtime for path in painted]
         alive, sizes = [], []
@@ -162,10 +152,9 @@ def _trial(model: Model, radius: int, refine: int) -> _Trial:
             active, _, copied = active_cells(Frame(number, folder / target.name), SmokeFormat())
             alive.append(int(around(active, dilation).values.sum()))
             sizes.append(target.stat().st_size - copied)
-    unit = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss
     seconds = (ends[-1] - ends[0]) / (len(ends) - 1)
     begin = max(0.0, ends[0] - begun - seconds)
-    return _Trial(alive[-1], begin, seconds, usage.ru_maxrss * unit, sizes[-1])
+    return _Trial(alive[-1], begin, seconds, sizes[-1])
 
 
 @dataclass(frozen=True)
@@ -191,7 +180,7 @@ def planned(
     counts: Sequence[Count],
     costs: Costs,
     *,
-    warmup: float,
+    memory: int,
     machines: int = 1,
     chunk: int = 0,
     preroll: int | None = 0,
@@ -201,7 +190,7 @@ def planned(
     Args:
         counts: Their cells.
         costs: Those of a machine.
-        warmup: What comes before the first frame, in frames.
+        memory: Bytes of a program at most.
         machines: How many share the work, each a chunk at a time.
         chunk: Frames in a chunk; all unless given.
         preroll: Frames stepped through before each chunk but the first, at most; None for all.
@@ -210,7 +199,7 @@ def planned(
 
     def taken(first: int, stop: int) -> float:
         begin = 0 if preroll is None else max(0, first - preroll)
-        return costs.begin + warmup * times[begin] + sum(times[begin:stop])
+        return costs.begin.at(counts[begin].cells) + sum(times[begin:stop])
 
     count, size = len(counts), chunk or len(counts)
     busy = [0.0] * machines
@@ -221,6 +210,6 @@ def planned(
         taken(0, count),
         machines,
         max(busy),
-        round(max(costs.memory.at(count.cells) for count in counts)),
+        memory,
         round(sum(costs.disk.at(count.cells) + count.copied for count in counts)),
     )

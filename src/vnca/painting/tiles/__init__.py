@@ -9,7 +9,8 @@ EDGES = (768, 512, 384, 256, 192, 128, 96, 64, 48, 32)
 """Cells along a side of the tiles that are chosen from, the largest first."""
 _LIKELY_HALO = 12
 _TILES_OF_A_RANK = 4
-_CELL, _PAINTED_CELL, _REST = 350, 130, 400_000_000
+_CELL, _PAINTED_CELL, _REST = 300, 140, 190_000_000
+"""Bytes, within a fifth of what frames of 0.08 to 2.1 million cells took (benchmarks/plan.py)."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Tiling:
 
 
 def bytes_needed(cells: int, *, grid: int, finer: int) -> int:
-    """About what it takes to paint so many cells of smoke at a time.
+    """About what a program takes that paints so many cells of smoke at a time.
 
     Args:
         cells: As they are in the file.
