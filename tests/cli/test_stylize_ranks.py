@@ -23,16 +23,20 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-@pytest.fixture
-def command() -> Callable[..., list[str]]:
-    """The command line of some ranks."""
+def launcher(size: int) -> list[str]:
+    """What starts some ranks."""
     pytest.importorskip("mpi4py", reason="the extra mpi is not installed")
     if MPIRUN is None:
         pytest.skip("no mpirun")
+    return [MPIRUN, "-n", str(size), "--oversubscribe", "--allow-run-as-root", sys.executable]
+
+
+@pytest.fixture
+def command() -> Callable[..., list[str]]:
+    """The command line of some ranks."""
 
     def words(size: int, *arguments: object) -> list[str]:
-        launcher = [MPIRUN, "-n", size, "--oversubscribe", "--allow-run-as-root"]
-        return [str(word) for word in (*launcher, sys.executable, "-m", "vnca", *arguments)]
+        return [*launcher(size), "-m", "vnca", *map(str, arguments)]
 
     return words
 

@@ -12,20 +12,17 @@ from signal import SIGKILL
 from typing import Any
 
 import pytest
-from tests.cli.test_stylize_ranks import MPIRUN, ranks_of
+from tests.cli.test_stylize_ranks import launcher, ranks_of
 from tests.faults.test_stylizing_kills import contents, require_whole
 
-pytestmark = [
-    pytest.mark.faults,
-    pytest.mark.skipif(MPIRUN is None, reason="no mpirun"),
-]
+pytestmark = pytest.mark.faults
 CHUNKS = (("1-3", None, "a"), ("4-6", "a", "b"), ("7-8", "b", None))
 """Their frames, and by which file the state is handed over."""
 
 
 def started(size: int, arguments: list[object]) -> "subprocess.Popen[str]":
-    launcher = [MPIRUN, "-n", size, "--oversubscribe", "--allow-run-as-root"] if size > 1 else []
-    command = [str(word) for word in (*launcher, sys.executable, "-m", "vnca", *arguments)]
+    program = launcher(size) if size > 1 else [sys.executable]
+    command = [str(word) for word in (*program, "-m", "vnca", *arguments)]
     return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
 
 
@@ -52,7 +49,6 @@ def survive(
     paint: Callable[[Path], list[list[object]]], folder: Path, kills: int, seed: int
 ) -> None:
     """Kill paintings, each a list of jobs one after the other, and compare how they end."""
-    pytest.importorskip("mpi4py", reason="the extra mpi is not installed")
     draw = random.Random(seed)
     longest = max(finish(2, arguments) for arguments in paint(folder / "unharmed"))
     expected = {n: data for n, data in contents(folder / "unharmed").items() if n.endswith(".vdb")}
