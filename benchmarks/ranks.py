@@ -1,26 +1,26 @@
 """How painting scales over ranks: what each does and sends, and what that comes to for many.
 
     python benchmarks/ranks.py measure build/ranks --csv benchmarks/results/ranks.csv
-    python benchmarks/ranks.py simulate build/ranks SMOKE.vdb --cells 1e9
+    python benchmarks/ranks.py simulate SMOKE.vdb --csv benchmarks/results/ranks.csv --cells 1e9
 
 `measure` paints a made column of smoke with 1 to 4 ranks, threads of one program: the same smoke
 for all (strong), and as much for each (weak). Seconds are those that the processor spent on a rank,
 so they hold on a machine that does other things, too; they do not tell what waiting would cost.
 Cells times steps, messages and bytes are exact; those of all but the first rank hold the painted
-leaves, too, which the first gathers. The costs of a cell are kept in the folder, and `simulate`
-takes them to 64 to 4096 ranks, on the smoke of a file enlarged to so many cells;
+leaves, too, which the first gathers. `simulate` takes the costs of a cell
+to 64 to 4096 ranks, on the smoke of a file enlarged to so many cells;
 docs/guide/large.md states what it assumes.
 """
 
 import argparse
 import csv
-import json
 import subprocess
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import closing
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -48,7 +48,7 @@ from vnca.rule.library import load_style
 
 FIELDS = (
     *("scaling", "ranks", "rank", "tiles", "cells", "own", "computed", "messages", "megabytes"),
-    *("begin_s", "steps_s", "paint_s"),
+    *("begin_s", "steps_s", "paint_s", "write_s", "file_mb"),
 )
 SMOKE = SmokeFormat(velocity_units=CELLS_PER_FRAME)
 STEPS, WARMUP, FRAMES, TILE, HALO = 8, 8, 2, 32, 4
@@ -60,7 +60,6 @@ SIMULATED = (
     *("ranks", "tiles", "most/mean", "computed", "MB/round", "messages", "wait ms", "busy s"),
     "of ideal",
 )
-COSTS = "costs.json"
 
 
 class Timed(TiledRoll):
@@ -155,39 +154,43 @@ def make(folder: Path, box: str) -> Path:
 
 
 def measure(options: argparse.Namespace) -> None:
-    rows, alone = [], None
-    for scaling in ("strong", "weak"):
-        for size in (1, 2, 3, 4):
+    with options.csv.open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(FIELDS)
+        for scaling, size in product(("strong", "weak"), (1, 2, 3, 4)):
             high = 192 if scaling == "strong" else 96 * size
             folder = make(options.folder / f"high_{high}", f"96x96x{high}")
-            every = painted(folder, size)
-            alone = alone or (every[0] if size == 1 else None)
-            for rank, each in enumerate(every):
-                rows.append(
-                    (
-                        *(scaling, size, rank, each.tiles, each.cells, each.worked["own"]),
-                        *(each.worked["all"], each.messages, round(each.bytes / 1e6, 3)),
-                        *(round(each.seconds[what], 3) for what in ("begin", "steps", "paint")),
-                    )
+            for rank, each in enumerate(painted(folder, size)):
+                row = (
+                    *(scaling, size, rank, each.tiles, each.cells, each.worked["own"]),
+                    *(each.worked["all"], each.messages, round(each.bytes / 1e6, 3)),
+                    *(round(each.seconds[what], 3) for what in ("begin", "steps", "paint")),
+                    *(round(each.written[0], 3), round(each.written[1] / 1e6, 3)),
                 )
-                print(*rows[-1], flush=True)
-    with options.csv.open("w", newline="") as file:
-        csv.writer(file).writerows([FIELDS, *rows])
-    assert alone is not None
-    seconds, (writing, size) = alone.seconds, alone.written
-    cost = {
-        "begin": seconds["begin"] / (FRAMES * alone.cells),
-        "step": seconds["steps"] / alone.worked["all"],
-        "paint": seconds["paint"] / (FRAMES * alone.cells),
-        "write": writing / alone.cells,
-        "file": size / alone.cells,
+                table.writerow(row)
+                print(*row, flush=True)
+            file.flush()
+
+
+def costs(path: Path) -> dict[str, float]:
+    """What a cell takes of one rank by itself: seconds, and bytes of the painted file."""
+    with path.open(newline="") as file:
+        row = next(csv.DictReader(file))
+    assert (row["scaling"], row["ranks"]) == ("strong", "1")
+    told = {name: float(value or "nan") for name, value in row.items() if name != "scaling"}
+    painted = FRAMES * told["cells"]
+    return {
+        "begin": told["begin_s"] / painted,
+        "step": told["steps_s"] / told["computed"],
+        "paint": told["paint_s"] / painted,
+        "write": told["write_s"] / told["cells"],
+        "file": told["file_mb"] * 1e6 / told["cells"],
     }
-    (options.folder / COSTS).write_text(json.dumps(cost))
-    print({name: f"{value:.3g}" for name, value in cost.items()})
 
 
 def simulate(options: argparse.Namespace) -> None:
-    cost = json.loads((options.folder / COSTS).read_text())
+    cost = costs(options.csv)
+    print({name: f"{value:.3g}" for name, value in cost.items()})
     rule = load_style("ink").rule.config
     active, _, _ = active_cells(Frame(1, options.smoke), SmokeFormat())
     alive = around(active, rule.dilation)
@@ -197,7 +200,9 @@ def simulate(options: argparse.Namespace) -> None:
     halo = options.halo / volume ** (1 / 3)
     writing = options.cells * (cost["write"] + cost["file"] / BANDWIDTH)
     print(f"{options.cells:.3g} cells, {steps} steps a frame, {options.halo} cells around a tile")
-    print(f"the first rank writes a frame in {writing:.0f} s")
+    print(f"the first rank gathers and writes {options.cells * cost['file'] / 1e9:.0f} GB a frame")
+    if writing == writing:  # it was measured
+        print(f"in {writing:.0f} s")
     print(" ".join(f"{word:>9}" for word in SIMULATED))
     for size in (64, 256, 1024, 4096):
         edge = max(EDGE, int((count / size / options.tiles) ** (1 / 3)) // EDGE * EDGE)
@@ -235,7 +240,7 @@ def main() -> None:
     measuring.add_argument("--csv", type=Path, required=True)
     measuring.set_defaults(run=measure)
     simulating = commands.add_parser("simulate", help="64 to 4096 ranks")
-    simulating.add_argument("folder", type=Path)
+    simulating.add_argument("--csv", type=Path, required=True)
     simulating.add_argument("smoke", type=Path)
     simulating.add_argument("--cells", type=float, default=1e9)
     simulating.add_argument("--halo", type=int, default=4)
