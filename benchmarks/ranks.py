@@ -14,6 +14,7 @@ docs/guide/large.md states what it assumes.
 
 import argparse
 import csv
+import math
 import subprocess
 import sys
 import time
@@ -201,7 +202,7 @@ def simulate(options: argparse.Namespace) -> None:
     writing = options.cells * (cost["write"] + cost["file"] / BANDWIDTH)
     print(f"{options.cells:.3g} cells, {steps} steps a frame, {options.halo} cells around a tile")
     print(f"the first rank gathers and writes {options.cells * cost['file'] / 1e9:.0f} GB a frame")
-    if writing == writing:  # it was measured
+    if not math.isnan(writing):
         print(f"in {writing:.0f} s")
     print(" ".join(f"{word:>9}" for word in SIMULATED))
     for size in (64, 256, 1024, 4096):
