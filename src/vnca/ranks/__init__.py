@@ -5,7 +5,7 @@ the same order.
 """
 
 import os
-import pickle
+import pickle  # nosec B403
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
@@ -131,7 +131,7 @@ class Ranks(ABC):
             going = {0: np.frombuffer(data, np.uint8)} if data else {}
             self.swap(going, coming).wait()
             for rank in sorted(coming):
-                take(pickle.loads(coming[rank].data))  # of this very program
+                take(pickle.loads(coming[rank].data))  # of this very program  # nosec B301
 
     def give_up(self, line: str) -> None:
         """Leave it to the first rank to tell why this one ends, and to end all.
