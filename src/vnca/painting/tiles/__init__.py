@@ -10,7 +10,7 @@ EDGES = (768, 512, 384, 256, 192, 128, 96, 64, 48, 32)
 _LIKELY_HALO = 12
 _TILES_OF_A_RANK = 4
 _CELL, _PAINTED_CELL, _REST = 300, 140, 190_000_000
-"""Bytes, within a fifth of what frames of 0.08 to 2.1 million cells took (benchmarks/plan.py)."""
+"""Bytes, fitted to what frames of 0.08 to 2.1 million cells took, within a fifth."""
 
 
 @dataclass(frozen=True)
