@@ -12,6 +12,18 @@ def fill(
     threads: int,
     /,
 ) -> None: ...
+def trace(
+    velocity: FloatArray,
+    bricks: IntArray,
+    lower: tuple[int, int, int],
+    upper: tuple[int, int, int],
+    least: float,
+    cells: IntArray,
+    times: FloatArray,
+    out: FloatArray,
+    threads: int,
+    /,
+) -> None: ...
 def carry(
     state: FloatArray,
     bricks: IntArray,
