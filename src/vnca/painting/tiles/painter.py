@@ -58,12 +58,12 @@ class TiledPainter(Painter):
     def _made_ready(self, smoke: Any) -> tuple[Any, Ready | None]:
         return smoke, None
 
-    def _write(self, frame: Frame, read: Read, left: Unfinished) -> TiledState:
+    def _painted(self, frame: Frame, read: Read, left: Unfinished) -> tuple[TiledState, None]:
         smoke: SmokeParts = read.smoke
         self._look(smoke, read.frame.path)
         state = self.tiled.advance(smoke, left.state)
         if frame not in self.frames:
-            return state
+            return state, None
         mass = self.tiled.mass(smoke, state)
         kept = self._leaves(smoke) if isinstance(smoke, VdbSmoke) else _Whole(self, read)
         boxes = list(kept.boxes(self.tiling.edge * self.roll.finer))
@@ -73,7 +73,7 @@ class TiledPainter(Painter):
             self.watch(f"frame {smoke.frame}: tile {number} of {len(boxes)} painted")
         self._begin_to_write(frame, read, left)
         kept.write(self.target(frame), self.provenance(read))
-        return state
+        return state, None
 
     def _look(self, smoke: SmokeParts, path: Path) -> None:
         """Look at the velocity in a tile, of each frame in the same one."""
