@@ -48,7 +48,7 @@ def no_long_work(monkeypatch: pytest.MonkeyPatch) -> None:
     for network in (EfficientNet, VGG16):
         monkeypatch.setattr(network, "load", begin)
     monkeypatch.setattr(Trainer, "improve", begin)
-    monkeypatch.setattr("vnca.painting.Roll.paint", begin)
+    monkeypatch.setattr("vnca.painting.Roll.stepped", begin)
     monkeypatch.setattr("vnca.recipe.rendering.read_colour", begin)
 
 

@@ -12,7 +12,7 @@ import vnca as library
 from vnca.core.volume import Volume
 from vnca.io import read_smoke, write_smoke
 from vnca.io.vdb import open_vdb
-from vnca.painting import Painting, Roll, RollState
+from vnca.painting import Roll, RollState
 from vnca.recipe import Silent
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.loop import Progress, Trainer
@@ -73,16 +73,16 @@ def stop_training(patch: pytest.MonkeyPatch) -> None:
 
 
 def stop_painting(patch: pytest.MonkeyPatch) -> None:
-    paint, painted = Roll.paint, 0
+    paint, painted = Roll.stepped, 0
 
-    def interrupted(self: Roll, smoke: Volume, state: RollState) -> Painting:
+    def interrupted(self: Roll, smoke: Volume, state: RollState) -> Any:
         nonlocal painted
         painted += 1
         if painted == 3:
             raise KeyboardInterrupt
         return paint(self, smoke, state)
 
-    patch.setattr(Roll, "paint", interrupted)
+    patch.setattr(Roll, "stepped", interrupted)
 
 
 def test_a_sequence_and_a_picture_become_a_painting_and_a_film(job: Job, smoke: Path) -> None:
@@ -120,7 +120,7 @@ def test_it_goes_on_where_it_was_interrupted_to_the_same_files(
     assert whole.run().code == 0
     assert job.files == whole.files
     # And when all is done there is nothing to do.
-    monkeypatch.setattr(Roll, "paint", lambda *_: pytest.fail("painted again"))
+    monkeypatch.setattr(Roll, "stepped", lambda *_: pytest.fail("painted again"))
     monkeypatch.setattr(Trainer, "improve", lambda *_: pytest.fail("trained again"))
     assert job.run("--resume").code == 0
 

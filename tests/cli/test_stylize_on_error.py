@@ -12,7 +12,7 @@ from PIL import Image
 from vnca.core.volume import Volume
 from vnca.io import SmokeFormat, read_smoke, write_smoke
 from vnca.io.vdb import Grid, open_vdb, write_vdb
-from vnca.painting import Painting, Roll, RollState
+from vnca.painting import Roll, RollState
 
 Vnca = Callable[..., Any]
 Paint = Callable[..., Any]
@@ -34,15 +34,15 @@ def paint(vnca: Vnca, model: Path, smoke: Path, tmp_path: Path) -> Paint:
 @pytest.fixture
 def while_painting(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], object]], None]:
     """Lets something happen while the first frame is painted, when the second is read already."""
-    paint = Roll.paint
+    stepped = Roll.stepped
 
     def patch(event: Callable[[], object]) -> None:
-        def eventful(self: Roll, smoke: Volume, state: RollState) -> Painting:
+        def eventful(self: Roll, smoke: Volume, state: RollState) -> Any:
             if smoke.frame == 1:
                 event()
-            return paint(self, smoke, state)
+            return stepped(self, smoke, state)
 
-        monkeypatch.setattr(Roll, "paint", eventful)
+        monkeypatch.setattr(Roll, "stepped", eventful)
 
     return patch
 
@@ -211,15 +211,15 @@ def while_the_second_is_painted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> Callable[[Callable[[], object]], None]:
     """Lets something happen between the reading of the second frame and its writing."""
-    paint = Roll.paint
+    stepped = Roll.stepped
 
     def patch(event: Callable[[], object]) -> None:
-        def eventful(self: Roll, smoke: Volume, state: RollState) -> Painting:
+        def eventful(self: Roll, smoke: Volume, state: RollState) -> Any:
             if smoke.frame == 2:
                 event()
-            return paint(self, smoke, state)
+            return stepped(self, smoke, state)
 
-        monkeypatch.setattr(Roll, "paint", eventful)
+        monkeypatch.setattr(Roll, "stepped", eventful)
 
     return patch
 
@@ -285,16 +285,16 @@ def test_a_painting_with_a_broken_frame_goes_on_to_the_same_files(
         truncate(smoke / f"ball_{number:04d}.vdb")
     options = ("--on-error", on_error)
     assert paint("unharmed", *options).code == 0
-    paint_frame, count = Roll.paint, 0
+    paint_frame, count = Roll.stepped, 0
 
-    def interrupted(self: Roll, volume: Volume, state: RollState) -> Painting:
+    def interrupted(self: Roll, volume: Volume, state: RollState) -> Any:
         nonlocal count
         count += 1
         if count % 2 == 0:
             raise KeyboardInterrupt
         return paint_frame(self, volume, state)
 
-    monkeypatch.setattr(Roll, "paint", interrupted)
+    monkeypatch.setattr(Roll, "stepped", interrupted)
     codes = [paint("out", *options).code]
     while codes[-1]:
         codes.append(paint("out", *options, "--resume").code)

@@ -14,9 +14,9 @@ from PIL import Image
 
 from vnca.core.volume import Volume
 from vnca.engine import native
-from vnca.io import SmokeFormat, read_smoke, write_smoke
+from vnca.io import SmokeFormat, read_smoke, write_painted, write_smoke
 from vnca.io.sequence import find_frames
-from vnca.painting import Painting, Roll, RollState
+from vnca.painting import Roll, RollState
 from vnca.painting.unfinished import Unfinished
 from vnca.rule import Rule
 from vnca.rule.model import MODEL_NAME, Model
@@ -64,20 +64,20 @@ def painted(vnca: Vnca, model: Path, smoke: Path, tmp_path: Path) -> Painted:
 @pytest.fixture
 def during(monkeypatch: pytest.MonkeyPatch) -> "During":
     """Lets something happen while the n-th frame from now on is painted, counted from 1."""
-    paint, wait, event = Roll.paint, 0, control_c
+    stepped, wait, event = Roll.stepped, 0, control_c
 
-    def eventful(self: Roll, smoke: Volume, state: RollState) -> Painting:
+    def eventful(self: Roll, smoke: Volume, state: RollState) -> Any:
         nonlocal wait
         wait -= 1
         if wait == 0:
             event()
-        return paint(self, smoke, state)
+        return stepped(self, smoke, state)
 
     def set_event(frame: int, what: Callable[[], object]) -> None:
         nonlocal wait, event
         wait, event = frame, what
 
-    monkeypatch.setattr(Roll, "paint", eventful)
+    monkeypatch.setattr(Roll, "stepped", eventful)
     return set_event
 
 
@@ -349,7 +349,7 @@ def test_a_damaged_state_is_refused_in_one_line_or_does_no_harm(unfinished: Pain
 
 @pytest.mark.parametrize("seconds", [1.0, 0.001])
 def test_keeping_the_state_takes_little_time(
-    painted: Painted, monkeypatch: pytest.MonkeyPatch, during: During, seconds: float
+    painted: Painted, monkeypatch: pytest.MonkeyPatch, seconds: float
 ) -> None:
     """Where it is slow the state is kept less often, but always the first time and at the end."""
     now, saved, save = 0.0, [], Unfinished.save
@@ -360,14 +360,14 @@ def test_keeping_the_state_takes_little_time(
         saved.append(len(self.sources))
         save(self, path)
 
-    def painting() -> None:
+    def writing(*arguments: Any, **options: Any) -> None:
         nonlocal now
         now += 10
-        during(1, painting)
+        write_painted(*arguments, **options)
 
     monkeypatch.setattr(Unfinished, "save", slowly)
-    monkeypatch.setattr("vnca.painting.painter.time.monotonic", lambda: now)
-    during(1, painting)
+    monkeypatch.setattr("vnca.painting.painter.write_painted", writing)
+    monkeypatch.setattr("vnca.painting.behind.time.monotonic", lambda: now)
     assert painted.run().code == 0
     assert saved == ([0, 1, 3] if seconds == 1 else [0, 1, 2, 3])
 

@@ -150,7 +150,7 @@ def assert_close_to_bfloat16(got: dict[str, AnyArray], expected: dict[str, AnyAr
     gradients with them."""
     for name, exact in expected.items():
         error = np.linalg.norm(got[name] - exact) / max(float(np.linalg.norm(exact)), 1e-30)
-        assert error <= (5e-3 if name == "state" else 6e-2), name
+        assert error <= (5e-3 if name == "state" else 7e-2), name
 
 
 CASES = {

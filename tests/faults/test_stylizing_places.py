@@ -5,13 +5,14 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from vnca.cli import main
 from vnca.core.volume import Volume
 from vnca.io.vdb import open_vdb
-from vnca.painting import Painting, Roll, RollState
+from vnca.painting import Roll, RollState
 
 pytestmark = [
     pytest.mark.faults,
@@ -105,7 +106,7 @@ def test_a_read_only_disk_is_refused_before_work(
     remount: Callable[[str], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(Roll, "paint", lambda *_: pytest.fail("painted"))
+    monkeypatch.setattr(Roll, "stepped", lambda *_: pytest.fail("painted"))
     remount("ro")
     for options in (("--out", disk / "out"), ("--out", "out", "--preview", disk / "film.gif")):
         code, complaint = stylize(*options)
@@ -121,16 +122,16 @@ def test_a_disk_that_becomes_read_only_keeps_the_frames_before(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As the system makes a disk that fails."""
-    paint, painted = Roll.paint, 0
+    paint, painted = Roll.stepped, 0
 
-    def eventful(self: Roll, smoke: Volume, state: RollState) -> Painting:
+    def eventful(self: Roll, smoke: Volume, state: RollState) -> Any:
         nonlocal painted
         painted += 1
         if painted == 4:
             remount("ro")
         return paint(self, smoke, state)
 
-    monkeypatch.setattr(Roll, "paint", eventful)
+    monkeypatch.setattr(Roll, "stepped", eventful)
     out = disk / "out"
     code, complaint = stylize("--out", out)
     assert code == 2

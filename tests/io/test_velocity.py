@@ -11,6 +11,7 @@ from vnca.core import AnyArray, BoolArray, FloatArray, Index
 from vnca.core.errors import GridError, OptionError
 from vnca.core.field import Field
 from vnca.core.volume import Volume
+from vnca.engine import native
 from vnca.io import velocity as in_fields
 from vnca.io import velocity as interpolation
 from vnca.io.velocity import cells_per_frame, fit_velocity_scale, likely_velocity_scale
@@ -307,3 +308,32 @@ def test_unknown_cells_have_no_share(seed: int, share: float) -> None:
             assert there
             expected = sum(weight * linear(np.array(cell)) for weight, cell in some) / total
             np.testing.assert_allclose(value, expected, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.skipif(native.unavailable() is not None, reason="no native extension")
+@settings(deadline=None, max_examples=60)
+@given(
+    st.tuples(*[st.integers(1, 20)] * 3),
+    st.tuples(*[st.integers(-20, 20)] * 3),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([0.0, 0.3, 5.0, 1e9]),
+    st.booleans(),
+)
+def test_smoke_is_traced_back_natively_to_the_bits_of_numpy(
+    shape: Index, origin: Index, seed: int, speed: float, each_its_own: bool
+) -> None:
+    random = np.random.default_rng(seed)
+    values = (speed * random.standard_normal((*shape, 3))).astype(np.float32)
+    values[random.random(shape) < 0.5] = 0
+    velocity = Field.from_dense(values, origin)
+    cells = (origin + random.integers(-3, np.array(shape) + 3, (200, 3))).astype(np.int32)
+    time = random.uniform(-2, 2, 200).astype(np.float32) if each_its_own else 1.5
+    right = in_fields.carried_to_by_numpy(cells, velocity, time)
+    for threads in (1, 3):
+        found = in_fields.carried_to(cells, velocity, time, threads=threads)
+        np.testing.assert_array_equal(found.view(np.int32), right.view(np.int32))
+
+
+def test_where_there_is_no_velocity_nothing_has_come_from_anywhere() -> None:
+    nothing = Field.from_dense(np.zeros((0, 0, 0, 3), np.float32), (0, 0, 0))
+    assert not in_fields.carried_to(np.zeros((4, 3), np.int32), nothing, 1.0).any()

@@ -81,12 +81,23 @@ class Field:
         cls, cells: IntArray, values: AnyArray, box: Box, *, outside: Any = 0
     ) -> "Field":
         """Values `[n, ...]` at cells `[n, 3]` of the box, each once."""
+        return cls.all_from_cells(cells, box, (values, outside))[0]
+
+    @classmethod
+    def all_from_cells(
+        cls, cells: IntArray, box: Box, *values: tuple[AnyArray, Any]
+    ) -> "list[Field]":
+        """As `from_cells`, of several values at the same cells, each with the one outside."""
         runs, lengths = runs_of_bricks(cells)
         bricks = sorted_bricks(runs)
-        flat = np.empty((len(bricks) * CELLS, *values.shape[1:]), values.dtype)
-        flat[...] = outside
-        flat[_flat_places(Places(bricks), runs, lengths, cells)] = values
-        return cls(bricks, flat.reshape(-1, EDGE, EDGE, EDGE, *values.shape[1:]), box, outside)
+        at, made = _flat_places(Places(bricks), runs, lengths, cells), []
+        for each, outside in values:
+            flat = np.empty((len(bricks) * CELLS, *each.shape[1:]), each.dtype)
+            flat[...] = outside
+            flat[at] = each
+            flat = flat.reshape(-1, EDGE, EDGE, EDGE, *each.shape[1:])
+            made.append(cls(bricks, flat, box, outside))
+        return made
 
     @property
     def origin(self) -> Index:

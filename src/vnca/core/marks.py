@@ -15,14 +15,14 @@ _LINE, _REST = np.uint64(8), np.uint64(56)
 
 def packed(marked: BoolArray) -> AnyArray:
     """Marks `[m, 8, 8, 8]` as bits: `[m, 8]`, a number a plane across x, a byte a line along z."""
-    lines = np.packbits(marked, axis=-1, bitorder="little")
-    return lines.reshape(len(marked), EDGE * EDGE).view("<u8")
+    # A line along z is a byte, so nothing has to be told of axes, which is many times as quick.
+    return np.packbits(marked.reshape(-1), bitorder="little").view("<u8").reshape(-1, EDGE)
 
 
 def unpacked(bits: AnyArray) -> BoolArray:
     """The reverse of `packed`."""
-    marked = np.unpackbits(bits.view(np.uint8), axis=-1, bitorder="little")
-    return marked.view(np.bool_).reshape(len(bits), EDGE, EDGE, EDGE)
+    lines = np.ascontiguousarray(bits).reshape(-1).view(np.uint8)
+    return np.unpackbits(lines, bitorder="little").view(np.bool_).reshape(-1, EDGE, EDGE, EDGE)
 
 
 WAYS = tuple(product(range(3), (-1, 1)))

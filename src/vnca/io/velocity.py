@@ -15,6 +15,7 @@ from vnca.core.volume import Volume
 from vnca.engine import native
 
 _LEAST_SHARE = 1e-6
+_TRACED_AT_ONCE = 1 << 15  # what that takes fits into a cache
 _SAMPLE, _FEWEST_CHANGES = 4000, 64
 _FAR_OFF, _CLEARLY = 4, 0.8
 VelocityUnits: TypeAlias = Literal["cells/frame", "m/s", "mantaflow"]
@@ -47,20 +48,19 @@ def interpolated(values: Field, known: Field, places: AnyArray) -> tuple[FloatAr
     below = np.minimum(np.floor(places), np.maximum(last - 1, first)).astype(np.int32)
     upper = (places - below).astype(np.float32).T
     shares = (1 - upper, upper)
-    # Laid out flat, with a brick of nothing behind the last.
-    blocks = values.blocks(known.bricks)
+    # Laid out flat, and not copied where that can be helped: there may be few places.
+    blocks = values.values if values.bricks is known.bricks else values.blocks(known.bricks)
     count = blocks.shape[-1]
-    flat_values = np.concatenate([blocks.reshape(-1, count), np.zeros((CELLS, count), np.float32)])
-    flat_known = np.concatenate([known.values.reshape(-1), np.zeros(CELLS, bool)])
+    flat_values, flat_known = blocks.reshape(-1, count), known.values.reshape(-1)
     total = np.zeros((len(places), count), np.float32)
     weight = np.zeros(len(places), np.float32)
-    for corner in product((0, 1), repeat=3):
+    for corner in product((0, 1), repeat=3) if len(flat_known) else ():
         # An axis of one cell has no cell above: the share of it is none.
         cells = known.find(below + np.array(corner, np.int32) * (last > first))
         i, j, k = corner
         share = shares[i][0] * shares[j][1] * shares[k][2]
-        share *= flat_known.take(cells)
-        total += share[:, None] * flat_values.take(cells, axis=0)
+        share *= (cells < len(flat_known)) & flat_known.take(cells, mode="clip")
+        total += share[:, None] * flat_values.take(cells, axis=0, mode="clip")
         weight += share
     is_known = weight > _LEAST_SHARE
     total /= np.where(is_known, weight, 1)[:, None]
@@ -196,20 +196,44 @@ def cells_per_frame(
     return np.eye(3)
 
 
-def carried_to(cells: AnyArray, velocity: Field, known: Field, frames: Any) -> FloatArray:
+def carried_to(
+    cells: AnyArray, velocity: Field, frames: Any, *, threads: int | None = None
+) -> FloatArray:
     """By how much what is at cells `[n, 3]` has come to them, `[n, 3]`: a midpoint step back.
 
-    Where no velocity is known halfway, that at the cell counts.
+    Where no velocity is known halfway, that at the cell counts. Natively where the native extension
+    is, else in numpy: to the same bits.
 
     Args:
         cells: Index coordinates.
-        velocity: `[..., 3]`, cells per frame.
-        known: Where it is stored, in the same box.
-        frames: The time, one or of each cell `[n, 1]`; below zero it goes back.
+        velocity: `[..., 3]`, cells per frame; known where it is not zero.
+        frames: The time, one or of each cell `[n]`; below zero it goes back.
+        threads: Of the native core; one for each core unless given.
     """
-    moved = frames * velocity.gather(cells)
-    halfway, found = interpolated(velocity, known, cells - 0.5 * moved)
-    moved[found] = (frames * halfway)[found]
+    if native.unavailable() is not None:
+        return carried_to_by_numpy(cells, velocity, frames)
+    moved = np.zeros((len(cells), 3), np.float32)
+    if not velocity.box.is_empty:
+        values = np.ascontiguousarray(velocity.values, np.float32)
+        bricks, cells = (np.ascontiguousarray(each, np.int32) for each in (velocity.bricks, cells))
+        arrays = (values, bricks, *map(tuple, velocity.box), _LEAST_SHARE)
+        times = np.array(frames, np.float32).reshape(-1)
+        how = (cells, times, moved, threads or native.default_threads())
+        native.checked("tracing back", native.extension().trace, *arrays, *how)
+    return moved
+
+
+def carried_to_by_numpy(cells: AnyArray, velocity: Field, frames: Any) -> FloatArray:
+    """As `carried_to`, readable."""
+    known = replace(velocity, values=velocity.values.any(axis=-1), outside=False)
+    time = np.broadcast_to(np.float32(frames), len(cells))[:, None]
+    moved = np.empty((len(cells), 3), np.float32)
+    for start in range(0, len(cells), _TRACED_AT_ONCE):
+        some = slice(start, start + _TRACED_AT_ONCE)
+        by = time[some] * velocity.gather(cells[some])
+        halfway, found = interpolated(velocity, known, cells[some] - 0.5 * by)
+        by[found] = (time[some] * halfway)[found]
+        moved[some] = by
     return moved
 
 
@@ -242,12 +266,11 @@ def likely_velocity_scale(first: Volume, second: Volume) -> float:
     if len(cells) < _FEWEST_CHANGES:
         return 1.0
     here, there = before.gather(cells), after.gather(cells)
-    moving = replace(velocity, values=velocity.values.any(axis=-1), outside=False)
     density = replace(before, values=before.values[..., None])
     stored = replace(before, values=np.ones(before.values.shape, bool), outside=False)
 
     def mismatch(scale: float) -> float:
-        upstream = cells - carried_to(cells, velocity, moving, scale)
+        upstream = cells - carried_to(cells, velocity, scale)
         fetched = interpolated(density, stored, upstream)[0][:, 0]
         return float(np.abs(fetched - there).mean() / np.abs(here - there).mean())
 

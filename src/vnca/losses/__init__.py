@@ -57,8 +57,9 @@ def relaxed_earth_movers_distance(
     with torch.no_grad():
         every = cost(x, y)
         nearest_to_x, nearest_to_y = every.argmin(1), every.argmin(0)
-    there = cost(x[:, None], y[nearest_to_x][:, None]).mean()
-    back = cost(x[nearest_to_y][:, None], y[:, None]).mean()
+    # The gradient of chosen rows is added by rows, where that of indexing takes single numbers.
+    there = cost(x[:, None], y.index_select(0, nearest_to_x)[:, None]).mean()
+    back = cost(x.index_select(0, nearest_to_y)[:, None], y[:, None]).mean()
     return torch.maximum(there, back)
 
 

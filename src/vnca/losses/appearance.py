@@ -228,7 +228,7 @@ class AppearanceLoss:
 
     def _drawn(self, features: Tensor, generator: torch.Generator) -> Tensor:
         count, device = len(features), features.device
-        return features[sample_positions(count, self.config.samples, generator, device)]
+        return _rows(features, sample_positions(count, self.config.samples, generator, device))
 
     def _features(self, picture: Tensor, grey: Tensor | None = None) -> list[list[Tensor]]:
         """Per layer, the maps of the picture in colour, in grey, or both."""
@@ -267,7 +267,7 @@ class AppearanceLoss:
         """The chosen vectors of every picture that has any."""
         for features, where in zip(_positions(maps), chosen, strict=True):
             if len(where):
-                yield features[where]
+                yield _rows(features, where)
 
 
 def style_scale(style_image: FloatArray, size: int, cells: float | None = None) -> float:
@@ -280,6 +280,11 @@ def style_scale(style_image: FloatArray, size: int, cells: float | None = None) 
     """
     cells = float(size) if cells is None else cells
     return picture_cells(style_image, cells, size) / cells
+
+
+def _rows(features: Float[Tensor, "n c"], where: Int[Tensor, " m"]) -> Float[Tensor, "m c"]:
+    """Some of the vectors; their gradient is added by rows, that of indexing number by number."""
+    return features.index_select(0, where)
 
 
 def _positions(maps: Float[Tensor, "b c r k"]) -> Float[Tensor, "b n c"]:

@@ -7,9 +7,9 @@ of a sequence.
 Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -158,11 +158,25 @@ class Roll:
             smoke: On a grid as fine as the automaton's; or what `ready` made of it.
             state: What the frame before it left.
         """
+        return self.stepped(smoke, state)[1]()
+
+    def stepped(
+        self, smoke: Volume | Ready, state: RollState
+    ) -> tuple[RollState, Callable[[], Painting]]:
+        """What a frame leaves to the next; and what makes its painting, at any time, in any thread.
+
+        Arguments are those of `paint`.
+        """
         ready = smoke if isinstance(smoke, Ready) else self.ready(smoke)
         moment = self.moment(ready.smoke, state.carried)
-        state, parts = self._stepped(ready, state, moment)
-        del ready, smoke  # what follows makes arrays of the same order
-        return self.painting(moment, parts, replace(state, carried=moment.carried))
+        rolls, each, states = (self, *self.layers), (ready, *ready.layers), (state, *state.layers)
+        parts = zip(rolls, each, states, strict=True)
+        left, *layers = (roll._advanced(on, before, moment) for roll, on, before in parts)
+        state = replace(left, layers=tuple(layers), carried=moment.carried)
+        # To show a state takes as much memory again as a session holds.
+        shown = [on._replace(session=None, conditioning=None, layers=()) for on in each]
+        seen = partial(self.seen, shown, (left, *layers), moment)
+        return state, lambda: self.painting(moment, seen(), state)
 
     def rule_of(self, smoke: Volume) -> Rule:
         """The rule with the weights of a frame."""
@@ -203,20 +217,6 @@ class Roll:
         count = self.rule.config.style_count
         shares = self.config.mix("style_mix", self.styles, count, moment, ready.domain.cells)
         return in_shares(given, self.rule, shares)
-
-    def _stepped(self, ready: Ready, state: RollState, moment: Moment) -> tuple[RollState, Parts]:
-        """The state after the steps of a frame, and what is painted, layers over each other."""
-        left = [
-            roll._advanced(each, before, moment)
-            for roll, each, before in zip(
-                (self, *self.layers),
-                (ready, *ready.layers),
-                (state, *state.layers),
-                strict=True,
-            )
-        ]
-        parts = self.seen((ready, *ready.layers), left, moment)
-        return replace(left[0], layers=tuple(left[1:])), parts
 
     def seen(self, ready: Sequence[Ready], states: Sequence[RollState], moment: Moment) -> Parts:
         """What is painted, layers over each other.

@@ -2,9 +2,8 @@
 
 import hashlib
 import json
-import time
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -14,7 +13,6 @@ from vnca.core import Box
 from vnca.core.errors import (
     FileFormatError,
     GridError,
-    OptionError,
     OutputError,
     ShapeError,
     VncaError,
@@ -24,24 +22,23 @@ from vnca.core.files import existing_file, remove_file, remove_leftovers
 from vnca.core.lattice import Lattice
 from vnca.core.volume import length_of_cells, refined_transform
 from vnca.io import SmokeFormat, open_source, read_smoke, write_painted
-from vnca.io.provenance import Provenance, read_provenance
+from vnca.io.provenance import Provenance
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import up_axis_of
 from vnca.io.vdb import VdbFile
 from vnca.painting import Ready, Roll
+from vnca.painting.behind import Keeping, Writing, in_turn, one_behind
 from vnca.painting.chunk import WHOLE, Chunk
+from vnca.painting.finished import MARK, is_complete, require_unchanged
 from vnca.painting.frames import VelocityCheck, read_ahead
 from vnca.painting.read import Read, close
+from vnca.painting.shown import Painting
 from vnca.painting.unfinished import Source, Unfinished
 from vnca.ranks import Alone, Ranks
 
 OnError = Literal["stop", "skip", "hold"]
 BROKEN = (FileFormatError, GridError, ShapeError)
 """What a frame is that cannot be read, or is another than it was a moment ago."""
-MARK = "painting"
-"""Entry of a painted file that tells frames of one painting from those of others."""
-_SAVING_SHARE = 0.02
-"""Share of the time that may go into keeping the state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +89,16 @@ class Painter:
         """Those that are painted."""
         return self.sequence[self.chunk.first : self.chunk.stop]
 
+    @cached_property
+    def _keeping(self) -> Keeping:
+        return Keeping(self.unfinished_path, self._save, self.ranks)
+
+    @property
+    def finished(self) -> int:
+        """How many frames are finished, of those that are painted."""
+        last = self._keeping.last
+        return 0 if last is None else max(0, len(last.sources) - self.chunk.first)
+
     @property
     def unfinished_path(self) -> Path:
         """Where the state is kept: named after the first frame, as several may share a folder."""
@@ -126,11 +133,11 @@ class Painter:
             remove_leftovers(self.out, names | {path.name})
         if path.exists() and resume:
             unfinished = self._loaded(path)
-            self._require_unchanged(unfinished.sources)
+            require_unchanged(self, unfinished.sources)
             done = max(0, len(unfinished.sources) - first)
             self.tell(f"{self.out}: going on after {done} frames")
             return unfinished
-        if resume and self._is_complete():
+        if resume and is_complete(self):
             self.tell(f"{self.out}: all {len(self.frames)} frames are painted already")
             if left is not None:
                 return self._loaded(left, handed_over=True)
@@ -153,24 +160,6 @@ class Painter:
         handed_over = partial(self._loaded, handed_over=True)
         return self.chunk.start(self.sequence, self.conditions, self._start(), handed_over)
 
-    def _is_complete(self) -> bool:
-        """Whether every frame is there, painted by this rule in this way from what it is now."""
-        if self.chunk.state_out is not None and not self.chunk.state_out.exists():
-            return False
-        for frame in self.frames:
-            target = self.target(frame)
-            if not target.exists() or not frame.path.exists():
-                return False
-            if frame.path.stat().st_mtime_ns > target.stat().st_mtime_ns:
-                return False
-            try:
-                told = read_provenance(target)
-            except FileFormatError:
-                return False
-            if told is None or told.facts.get(MARK) != self.mark:
-                return False
-        return True
-
     def paint(self, unfinished: Unfinished) -> Generator[Path | None, None, None]:
         """Go on from there to the end of the sequence.
 
@@ -181,41 +170,59 @@ class Painter:
         Raises:
             VncaError: If a file cannot be written, or a broken frame is to stop the painting.
         """
+        self._keeping.last = unfinished
+        done = unfinished.sources[self.chunk.first :]
+        jobs = self._jobs(unfinished)
+        # What ranks tell each other has an order, which threads do not keep.
+        paths = one_behind(jobs) if self.ranks.size == 1 else in_turn(jobs)
+        try:
+            for frame, source in zip(self.frames, done, strict=False):
+                yield self.target(frame) if source else None
+            for frame, path in paths:
+                if frame in self.frames:
+                    yield path
+            if self.chunk.state_out is not None:
+                self._save(self._keeping.last, self.chunk.state_out)
+        finally:
+            paths.close()
+            jobs.close()
+            self._keeping.end()
+
+    def _jobs(
+        self, unfinished: Unfinished
+    ) -> Generator[Callable[[], tuple[Frame, Path | None]], None, None]:
+        """Paint the frames that are left: of each what remains to be done, the writing.
+
+        Where a broken frame is not to stop the painting, it is done already: what the next one is
+        painted from depends on it.
+        """
         sources, state = list(unfinished.sources), unfinished.state
-        saved, due, start = len(sources), 0.0, len(sources)
-        stop, first = self.chunk.first + len(self.frames), self.chunk.first
+        start, stop = len(sources), self.chunk.first + len(self.frames)
         loads = (partial(self._read, at) for at in range(start, stop))
         reads = read_ahead(loads, unwanted=close)
         held = self._held(sources)
         try:
-            for frame, source in zip(self.frames, sources[first:], strict=False):
-                yield self.target(frame) if source else None
             for frame, read in zip(self.sequence[start:stop], reads, strict=True):
                 try:
                     left = Unfinished(self.conditions, tuple(sources), state)
-                    before, (held, state, source) = held, self._finish(frame, read, held, left)
-                finally:
+                    before, (held, state, source, write) = (
+                        held,
+                        self._finish(frame, read, held, left),
+                    )
+                    sources.append(source)
+                    after = Unfinished(self.conditions, tuple(sources), state)
+                    path = self.target(frame) if source else None
+                    unwanted = None if held is read else read
+                    yield partial(self._keeping.written, (frame, path), write, unwanted, after)
+                except BaseException:
                     if held is not read:
                         close(read)
+                    raise
                 if held is not before:
                     close(before)
-                sources.append(source)
-                if self.ranks.every(time.monotonic() >= due)[0]:
-                    begun = time.monotonic()
-                    self._save(sources, state, self.unfinished_path)
-                    saved, ended = len(sources), time.monotonic()
-                    due = ended + (ended - begun) / _SAVING_SHARE
-                if len(sources) > first:
-                    yield self.target(frame) if source else None
-            if self.chunk.state_out is not None:
-                self._save(sources, state, self.chunk.state_out)
         finally:
             reads.close()
             close(held)
-            # Of several ranks, the others may not be there any more.
-            if len(sources) > saved and self.ranks.size == 1:
-                with suppress(OutputError):
-                    self._save(sources, state, self.unfinished_path)
 
     def discard(self) -> None:
         """Forget the state: there is nothing to go on with."""
@@ -224,27 +231,36 @@ class Painter:
 
     def _finish(
         self, frame: Frame, read: Read | VncaError, held: Read | None, left: Unfinished
-    ) -> tuple[Read | None, Any, Source | None]:
+    ) -> tuple[Read | None, Any, Source | None, Writing | None]:
         """Paint a frame or do what is to be done if it is broken."""
         try:
             if isinstance(read, VncaError):
                 raise read
-            state = self._write(frame, read, left)
-            return read if self.on_error == "hold" else None, state, read.source
+            if self.on_error == "stop":
+                state, write = self._painted(frame, read, left)
+                return None, state, read.source, write
+            state = self._painted_and_written(frame, read, left)
+            return read if self.on_error == "hold" else None, state, read.source, None
         except BROKEN as error:
             if self.on_error == "stop":
                 raise
             if self.on_error == "hold" and held is not None:
                 self.tell(f"{error}; holding frame {held.frame.number} in its place")
-                return held, self._write(frame, held, left), held.source
+                return held, self._painted_and_written(frame, held, left), held.source, None
             self.tell(f"{error}; leaving it out")
             if frame in self.frames:
                 remove_file(self.target(frame))
-            return held, left.state, None
+            return held, left.state, None, None
 
-    def _save(self, sources: Sequence[Source | None], state: Any, path: Path) -> None:
+    def _painted_and_written(self, frame: Frame, read: Read, left: Unfinished) -> Any:
+        state, write = self._painted(frame, read, left)
+        if write is not None:
+            write()
+        return state
+
+    def _save(self, unfinished: Unfinished, path: Path) -> None:
         """Keep what is finished, and the state that it left."""
-        Unfinished(self.conditions, tuple(sources), state).save(path)
+        unfinished.save(path)
 
     def _start(self) -> Any:
         """The state before the first frame."""
@@ -260,19 +276,25 @@ class Painter:
         if frame == self.frames[0]:
             # From here on frames of an earlier painting are overwritten, and after an end at any
             # moment it is this one that can be gone on with.
-            self._save(left.sources, left.state, self.unfinished_path)
+            self._save(left, self.unfinished_path)
 
-    def _write(self, frame: Frame, read: Read, left: Unfinished) -> Any:
-        """Paint smoke to the file of a frame, unless it comes before the chunk; the state after."""
+    def _painted(self, frame: Frame, read: Read, left: Unfinished) -> tuple[Any, Writing | None]:
+        """The state after a frame, and what makes its file; nothing of one before the chunk."""
         self._velocity.look(read.smoke, read.frame.path)
         if frame not in self.frames:
-            return self.roll.passed(read.take(), left.state)
-        painting = self.roll.paint(read.take(), left.state)
+            return self.roll.passed(read.take(), left.state), None
+        state, shown = self.roll.stepped(read.take(), left.state)
+        return state, partial(self._write, frame, read, left, shown)
+
+    def _write(
+        self, frame: Frame, read: Read, left: Unfinished, shown: Callable[[], Painting]
+    ) -> None:
+        """Make the file of a frame."""
+        painting = shown()
         self._begin_to_write(frame, read, left)
         fields = painting.density_field, painting.colour_field, painting.emission
         told = self.provenance(read)
         self.write(self.target(frame), read, told, fields, painting.smoke.box)
-        return painting.state
 
     def write(
         self,
@@ -373,27 +395,3 @@ class Painter:
         if isinstance(read, VncaError):
             raise read
         return read
-
-    def _require_unchanged(self, sources: Sequence[Source | None]) -> None:
-        """Refuse to go on unless finished frames and what they were painted from are there."""
-        first = self.chunk.first
-        if not self.chunk.begin <= len(sources) <= first + len(self.frames) or any(
-            source and not 0 <= source.frame <= at for at, source in enumerate(sources)
-        ):
-            raise FileFormatError(
-                f"{self.unfinished_path}: its frames are not those of the sequence or the chunk; "
-                "start anew without `resume`"
-            )
-        for frame, source in zip(self.frames, sources[first:], strict=False):
-            if source is None:
-                continue
-            if not self.target(frame).exists():
-                raise OptionError(
-                    f"{self.target(frame)}: was finished but is gone; start anew without `resume`"
-                )
-            origin = self.sequence[source.frame].path
-            status = existing_file(origin).stat()
-            if (status.st_size, status.st_mtime_ns) != source[1:]:
-                raise OptionError(
-                    f"{origin}: has changed since it was painted; start anew without `resume`"
-                )

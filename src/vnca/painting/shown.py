@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vnca.core import AnyArray, Box, FloatArray, IntArray
+from vnca.core import AnyArray, FloatArray
 from vnca.core.field import Field
 from vnca.core.volume import Volume, dense, field_of
 from vnca.direction import Direction, Moment
@@ -99,14 +99,19 @@ def composed(
         mass: The smoke in all, as painted and before, if the frame is but a part.
     """
     box = smoke.box
-    inside = ((parts.at >= box.lower) & (parts.at < box.upper)).all(axis=1)
+    # Unsigned, what lies below the box is above it.
+    steps = (parts.at - np.array(box.lower, np.int32)).astype(np.uint32)
+    inside = (steps < np.array(box.shape, np.uint32)).all(axis=1)
     at, colour, factors = parts.at[inside], parts.colour[inside], parts.factors[inside]
     there = places(at)
     colour = direction.coloured(colour, moment, there, editing)
     strength = per_colour(direction.value("strength", moment, there))
-    colour = _continued(at, UNPAINTED + strength * (colour - UNPAINTED), box, UNPAINTED, reach)
+    colour = UNPAINTED + strength * (colour - UNPAINTED)
     factors = direction.outlined(factors, moment, there)
-    factors = Field.from_cells(at, factors, box, outside=1.0)
+    known = np.ones(len(at), bool)
+    fields = ((colour, UNPAINTED), (factors, 1.0), (known, False))
+    colour, factors, painted = Field.all_from_cells(at, box, *fields)
+    colour = _continued(colour, painted, reach)
     before = smoke.density_field
     density = replace(before, values=before.values * factors.blocks(before.bricks))
     density, colour = direction.fluffed(density, colour, factors, moment, places)
@@ -115,14 +120,13 @@ def composed(
         density = replace(density, values=of_mass(density, now, was))
     light = None
     if direction.burns:
-        light = _continued(at, direction.emission(moment, there), box, 0.0, reach)
+        light = Field.from_cells(at, direction.emission(moment, there), box, outside=0.0)
+        light = _continued(light, painted, reach)
     return density, colour, light
 
 
-def _continued(at: IntArray, values: FloatArray, box: Box, outside: float, reach: int) -> Field:
-    """Vectors at points, going on for some cells around them; `outside` farther away."""
-    field = Field.from_cells(at, values, box, outside=outside)
-    known = Field.from_cells(at, np.ones(len(at), bool), box, outside=False)
-    field, known = extrapolated(field, known, reach)
-    field.values[~known.values] = outside
-    return replace(field, outside=outside)
+def _continued(field: Field, known: Field, reach: int) -> Field:
+    """Known vectors going on for some cells around; what the field has outside farther away."""
+    wide, known = extrapolated(field, known, reach)
+    wide.values[~known.values] = field.outside
+    return replace(wide, outside=field.outside)

@@ -5,21 +5,12 @@ Each cell takes what was upstream of it, a midpoint step back along the velocity
 Reference: Stam 1999, section 2.3 (semi-Lagrangian advection).
 """
 
-import os
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
-
-import numpy as np
-
 from vnca.core import FloatArray
 from vnca.core.field import Field
 from vnca.direction.mixing import Answer
 from vnca.engine.carrying import carried
 from vnca.engine.domain import Domain
 from vnca.io.velocity import carried_to
-
-CHUNK = 1 << 15
-"""Cells that are traced back at a time: what that takes fits into a cache."""
 
 
 def transported(
@@ -41,14 +32,5 @@ def transported(
         frames: The time, one or of each cell `[m]`; below zero it goes back.
         threads: How many carry; one a core unless given. The result is the same to the bit.
     """
-    known = replace(velocity, values=velocity.values.any(axis=-1), outside=False)
-    time = np.broadcast_to(np.float32(frames), len(after))[:, None]
-    moved = np.empty((len(after), 3), np.float32)
-
-    def trace(start: int) -> None:
-        some = slice(start, start + CHUNK)
-        moved[some] = carried_to(after.cells[some], velocity, known, time[some])
-
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        list(pool.map(trace, range(0, len(after), CHUNK)))
+    moved = carried_to(after.cells, velocity, frames, threads=threads)
     return carried(state, before, after, moved, threads=threads)

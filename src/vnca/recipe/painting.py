@@ -316,7 +316,7 @@ def _paint(
     painter: Painter, options: StylizeRun, watch: Watch, count: _Count
 ) -> Iterator[Path | None]:
     """The files of the frames, painted to the end, or until `watch` or the caller ends it."""
-    total, finished, first = len(painter.frames), 0, painter.chunk.first
+    total, first = len(painter.frames), painter.chunk.first
     count.total = total
     with ExitStack() as stack:
         film = _film(options, painter, stack, watch) if painter.ranks.leads else None
@@ -335,8 +335,7 @@ def _paint(
                     if finished > already:
                         watch.progress("painting", finished, total, "frames")
         except KeyboardInterrupt:
-            done = max(already, finished)
-            watch.note(f"stopped after {done} of {total} frames; `resume` goes on")
+            watch.note(f"stopped after {painter.finished} of {total} frames; `resume` goes on")
             raise
     painter.discard()
     if painter.chunk.state_out is not None:

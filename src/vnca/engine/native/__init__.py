@@ -222,22 +222,21 @@ def fill(values: FloatArray, known: AnyArray, cells: AnyArray, beside: AnyArray)
     checked("continuing values", extension().fill, *arrays, default_threads())
 
 
-def multiply_adds(rounds: int, *, precision: str = "float32", threads: int | None = None) -> float:
+def multiply_adds(
+    rounds: int,
+    *,
+    precision: str = "float32",
+    threads: int | None = None,
+    instructions: str = "",
+) -> float:
     """Multiply-adds of numbers that stay in registers: what a step could do at most.
 
-    Args:
-        rounds: As many times a few, in each thread.
-        precision: Of what is multiplied.
-        threads: How many; by default one for each core.
+    As many times a few as there are rounds, in each thread; the rest is as of `forward`.
 
     Returns:
         How many operations were done, two for each.
-
-    Raises:
-        BackendUnavailableError: If the extension was not built, or this machine has no bfloat16.
-        OptionError: If there is no precision of that name.
     """
-    how = (threads or default_threads(), precision == "bfloat16")
+    how = (threads or default_threads(), precision == "bfloat16", instructions)
     return extension(precision).multiply_adds(rounds, *how)
 
 

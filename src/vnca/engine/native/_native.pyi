@@ -3,12 +3,24 @@ from collections.abc import Sequence
 from vnca.core import AnyArray, FloatArray, IntArray
 
 def instructions(bfloat16: bool, /) -> list[str]: ...
-def multiply_adds(rounds: int, threads: int, bfloat16: bool, /) -> float: ...
+def multiply_adds(rounds: int, threads: int, bfloat16: bool, instructions: str, /) -> float: ...
 def fill(
     values: FloatArray,
     known: AnyArray,
     cells: AnyArray,
     beside: AnyArray,
+    threads: int,
+    /,
+) -> None: ...
+def trace(
+    velocity: FloatArray,
+    bricks: IntArray,
+    lower: tuple[int, int, int],
+    upper: tuple[int, int, int],
+    least: float,
+    cells: IntArray,
+    times: FloatArray,
+    out: FloatArray,
     threads: int,
     /,
 ) -> None: ...

@@ -257,9 +257,21 @@ class _HashedFile:
         for data in part.before:
             self.write(data)
         blocks = self.position
-        for data in part.values:
+        for data in _joined(part.values):
             self.write(data)
         self.patch(offsets_at, struct.pack("<3q", start, blocks, self.position))
+
+
+def _joined(pieces: Iterable[bytes]) -> Iterator[bytes]:
+    """The same bytes in fewer pieces: what leaves take is little, and hashing one takes long."""
+    waiting, size = [], 0
+    for piece in pieces:
+        waiting.append(piece)
+        size += len(piece)
+        if size >= _COPIED_AT_ONCE:
+            yield b"".join(waiting)
+            waiting, size = [], 0
+    yield b"".join(waiting)
 
 
 def _unique_names(grids: Sequence[Grid | GridHeader]) -> Iterator[bytes]:

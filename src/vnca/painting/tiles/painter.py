@@ -21,7 +21,7 @@ from vnca.painting.read import Read
 from vnca.painting.tiles import Tiling
 from vnca.painting.tiles.roll import TiledRoll
 from vnca.painting.tiles.state import TiledState
-from vnca.painting.unfinished import Source, Unfinished
+from vnca.painting.unfinished import Unfinished
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,10 +50,11 @@ class TiledPainter(Painter):
         conditions = self.conditions
         return Unfinished.load(path, conditions, self.roll, taken, handed_over=handed_over)
 
-    def _save(self, sources: Sequence[Source | None], state: TiledState, path: Path) -> None:
-        state = state.gathered(self.out, self.ranks)
+    def _save(self, unfinished: Unfinished, path: Path) -> None:
+        state: TiledState = unfinished.state
+        whole = replace(unfinished, state=state.gathered(self.out, self.ranks))
         if self.ranks.leads:
-            super()._save(sources, state, path)
+            super()._save(whole, path)
 
     def _opened(self, frame: Frame, file: VdbFile | None) -> SmokeParts:
         return open_parts(
@@ -63,13 +64,13 @@ class TiledPainter(Painter):
     def _made_ready(self, smoke: Any) -> tuple[Any, Ready | None]:
         return smoke, None
 
-    def _write(self, frame: Frame, read: Read, left: Unfinished) -> TiledState:
+    def _painted(self, frame: Frame, read: Read, left: Unfinished) -> tuple[TiledState, None]:
         smoke: SmokeParts = read.smoke
         if self.ranks.leads:
             self._look(smoke, read.frame.path)
         state = self.tiled.advance(smoke, left.state)
         if frame not in self.frames:
-            return state
+            return state, None
         mass = self.tiled.mass(smoke, state)
         kept = self._leaves(smoke) if isinstance(smoke, VdbSmoke) else _Whole(self, read)
         finer = self.roll.grid * self.roll.finer
@@ -85,7 +86,7 @@ class TiledPainter(Painter):
         self._begin_to_write(frame, read, left)
         if self.ranks.leads:
             kept.write(self.target(frame), self.provenance(read))
-        return state
+        return state, None
 
     def _look(self, smoke: SmokeParts, path: Path) -> None:
         """Look at the velocity in a tile, of each frame in the same one."""

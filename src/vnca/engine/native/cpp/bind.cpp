@@ -151,8 +151,9 @@ NB_MODULE(_native, m) {
         return names;
     });
 
-    m.def("multiply_adds", [](std::int64_t rounds, int threads, bool bfloat16) {
-        const Kernel& kernel = kernel_named("", bfloat16);
+    m.def("multiply_adds", [](std::int64_t rounds, int threads, bool bfloat16,
+                              const std::string& instructions) {
+        const Kernel& kernel = kernel_named(instructions, bfloat16);
         std::atomic<double> operations = 0;
         nb::gil_scoped_release released;
         ThreadPool::of_process().run(threads, threads, [&](int, int) {

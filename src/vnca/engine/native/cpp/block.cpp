@@ -5,6 +5,9 @@
 #include "brick.hpp"
 #include "multiply.hpp"
 #include "perceive.hpp"
+#if defined(VNCA_TILES)
+#include "tiles.hpp"
+#endif
 #include "vector.hpp"
 
 namespace vnca::VNCA_TARGET {
@@ -322,6 +325,9 @@ void backward(const Step& s, const float* packed, const Block& block, const floa
 }
 
 double multiply_adds(std::int64_t rounds) {
+#if defined(VNCA_TILES)
+    return tile_multiply_adds(rounds);
+#endif
     constexpr int CHAINS = REGISTERS == 32 ? 24 : 12;  // more than wait for one another
     // No two alike, and none known to the compiler, which would compute equal ones once.
     volatile float start = 0.5f;

@@ -83,6 +83,7 @@ struct Kernel {
 };
 
 // One for each instruction set that this build knows, fastest first.
+namespace amxbf16 { extern const Kernel kernel; }
 namespace avx512bf16 { extern const Kernel kernel; }
 namespace avx512 { extern const Kernel kernel; }
 namespace avx2 { extern const Kernel kernel; }

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <vector>
 
+#include "places.hpp"
 #include "ranges.hpp"
 #include "thread_pool.hpp"
 
@@ -16,50 +16,30 @@ namespace vnca {
 // Rows of a state by the index coordinates of their cells, through a table of the bricks of 8³.
 class RowsOfCells {
 public:
-    static constexpr int BRICK = 512;
+    static constexpr int BRICK = PlacesOfBricks::CELLS;
 
     RowsOfCells(const std::int32_t* bricks, const std::int32_t* rows, std::int64_t count,
                 std::int32_t outside)
-        : bricks_(bricks), rows_(rows), outside_(outside) {
-        while (std::int64_t(table_.size()) < 2 * count) table_.resize(2 * table_.size(), NONE);
-        for (std::int64_t brick = 0; brick < count; ++brick) {
-            std::size_t slot = slot_of(bricks + 3 * brick);
-            while (table_[slot] != NONE) slot = (slot + 1) & (table_.size() - 1);
-            table_[slot] = std::int32_t(brick);
-        }
-    }
+        : places_(bricks, count), rows_(rows), outside_(outside) {}
 
     // The rows of the 8³ cells of a brick, z fastest; nothing where there is none.
     const std::int32_t* brick(const std::int32_t at[3]) const {
-        for (std::size_t slot = slot_of(at);; slot = (slot + 1) & (table_.size() - 1)) {
-            const std::int32_t found = table_[slot];
-            if (found == NONE) return nullptr;
-            if (std::memcmp(bricks_ + 3 * std::int64_t(found), at, 3 * sizeof *at) == 0)
-                return rows_ + BRICK * std::int64_t(found);
-        }
+        const std::int64_t found = places_.find(at);
+        return found < 0 ? nullptr : rows_ + BRICK * found;
     }
 
     std::int32_t row(const std::int32_t cell[3]) const {
         const std::int32_t at[3] = {cell[0] >> 3, cell[1] >> 3, cell[2] >> 3};
         const std::int32_t* const rows = brick(at);
-        return rows ? rows[(cell[0] & 7) << 6 | (cell[1] & 7) << 3 | (cell[2] & 7)] : outside_;
+        return rows ? rows[PlacesOfBricks::place(cell)] : outside_;
     }
 
     std::int32_t outside() const { return outside_; }
 
 private:
-    static constexpr std::int32_t NONE = -1;
-
-    std::size_t slot_of(const std::int32_t at[3]) const {
-        std::uint64_t hash = 0;
-        for (int axis = 0; axis < 3; ++axis)
-            hash = (hash ^ std::uint32_t(at[axis])) * 0x9e3779b97f4a7c15u;
-        return (hash >> 32) & (table_.size() - 1);
-    }
-
-    const std::int32_t *bricks_, *rows_;
+    PlacesOfBricks places_;
+    const std::int32_t* rows_;
     std::int32_t outside_;
-    std::vector<std::int32_t> table_ = std::vector<std::int32_t>(16, NONE);
 };
 
 // The shares of four cells along an axis for a place between the two in the middle.

@@ -125,6 +125,10 @@ const Kernel* const* kernels() {
     static const auto found = [] {
         std::vector<const Kernel*> list;
 #if defined(__x86_64__)
+#if defined(VNCA_AMXBF16)
+        if (runs_avx512() && __builtin_cpu_supports("avx512bf16") && runs_tiles())
+            list.push_back(&amxbf16::kernel);
+#endif
 #if defined(VNCA_AVX512BF16)
         if (runs_avx512() && __builtin_cpu_supports("avx512bf16"))
             list.push_back(&avx512bf16::kernel);
