@@ -62,6 +62,9 @@ class TrainingConfig(ABC):
     iterations: a style of the library, a model, auto for the nearest style that fits, or none."""
     iterations: int = 400
     """Iterations of training."""
+    xavier_gain: float = 0.0
+    """Begin with a hidden layer of Xavier's normal distribution with this gain, as the authors'
+    later code does with 0.2; 0 for He's uniform one."""
     learning_rate: float = 3e-3
     """Adam's learning rate at its highest."""
     rate_warmup: int = 15
@@ -94,6 +97,8 @@ class TrainingConfig(ABC):
             raise OptionError(f"`decoder` {self.decoder}: must be from 0 to 128 units")
         if self.iterations < 1:
             raise OptionError(f"`iterations` {self.iterations}: at least 1 is needed")
+        if not 0 <= self.xavier_gain < inf:
+            raise OptionError(f"`xavier_gain` {self.xavier_gain}: must not be negative")
         if not (0 < self.learning_rate < inf and 0 < self.decay < inf):
             raise OptionError("`learning_rate` and `decay` must be positive")
         if self.rate_warmup < 0:

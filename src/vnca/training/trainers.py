@@ -56,7 +56,12 @@ def smoke_trainer(
     what = f"frame {smoke.frame}"
     smoke = on_lattice(smoke, Lattice.of(smoke.index_to_world, what), what)
     config = told_styles(config, style)
-    rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
+    rule = Rule.initial(
+        config.rule,
+        choose_scales(smoke, config),
+        seed=config.seed,
+        xavier_gain=config.xavier_gain,
+    )
     rule = replace(rule, decoder=config.initial_decoder())
     scene = SmokeScene(
         smoke, rule, config.view, augment=config.augment, device=device, backend=config.backend
@@ -152,7 +157,7 @@ def initial_rule(config: TextureConfig) -> Rule:
     """
     is_flat = config.dimensions == 2
     scales = Scales(velocity=config.motion_speed) if is_flat else Scales()
-    rule = Rule.initial(config.rule, scales, seed=config.seed)
+    rule = Rule.initial(config.rule, scales, seed=config.seed, xavier_gain=config.xavier_gain)
     rule = without_depth(rule) if is_flat else rule
     bound = config.rule.inputs**-0.5
     random = np.random.default_rng(config.seed)
