@@ -19,10 +19,13 @@ from pathlib import Path
 from tables import read, tables
 
 from vnca.core.files import whole_file, writable_folder
+from vnca.recipe.simulation import simulate
 
 HERE = Path(__file__).parent
 SMALLEST = ("--iterations", "2", "--size", "32", "--seeds", "0")
-SMALLEST_METHODS = ("--resolution", "16", "--count", "2", "--seeds", "0", "--methods", "vnca")
+SMALLEST_METHODS = ("--resolution", "16", "--count", "2", "--methods", "aurand", "lnst")
+PLUME, LAST = "plume", 12
+"""What the smallest studies are made on, a few hundred cells: a folder, and its last frame."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,12 @@ def command(piece: Piece, out: Path, *, full: bool, smallest: bool) -> list[str]
     """How a piece is called, but for the table it writes."""
     call = [str(HERE / f"{piece.script}.py"), "--out", str(out), *piece.options]
     if smallest:
-        return [*call, *(SMALLEST_METHODS if piece.script == "methods" else SMALLEST)]
+        call += ["--frame", str(out / PLUME / f"plume_{LAST:04d}.vdb"), *SMALLEST]
+        if piece.script == "methods":
+            return [*call, *SMALLEST_METHODS]
+        if piece.script == "generalisation":
+            return [*call, "--sequence", str(out / PLUME), "--frames", f"{LAST - 1}-{LAST}"]
+        return [*call, "--repeats", "2"] if piece.script == "cost" else call
     seeds = map(str, range(piece.seeds))
     return [*call, "--seeds", *seeds, *(["--full"] if full else [])]
 
@@ -106,6 +114,9 @@ def main() -> None:
     parser.add_argument("--smallest", action="store_true", help="to see that all of it works")
     options = parser.parse_args()
     out = options.out / "smallest" if options.smallest else options.out
+    if options.smallest:
+        for _ in simulate("plume", out=out / PLUME, resolution=16, frames=LAST):
+            pass
     findings = writable_folder(out) / "findings"
     findings.mkdir(parents=True, exist_ok=True)
     failed = []

@@ -119,7 +119,11 @@ def comparison(rows: Rows) -> list[str]:
         theirs = PREFERRED.get(method, ("not in the table",) + ("–",) * 3)
         values = (measured(rows, "methods", RUN_AS[method], name) for name in ours)
         lines.append(f"| {method} | {' | '.join([*theirs, *values, MISSING])} |")
-    where = f"Ours: {', '.join(grids)} cells, on a CPU." if grids else f"Ours: {MISSING}."
+    where = f"Ours: {', '.join(grids)} cells, on a CPU." if grids else f"Ours: {MISSING} so far."
+    where += (
+        " Figures of three methods on other smoke: "
+        "[other methods](guide/peers.md#what-a-comparison-shows-so-far)."
+    )
     return [*lines, "", where]
 
 

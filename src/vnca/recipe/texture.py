@@ -25,6 +25,7 @@ from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.picture import read_style
 from vnca.io.smoke_format import UpAxis
 from vnca.painting.block import KIND
+from vnca.painting.flat import without_depth
 from vnca.recipe import SILENT, PictureGiven, Watch, given_pictures, told_of_styles
 from vnca.recipe.session import (
     ResumeOptions,
@@ -191,6 +192,8 @@ def graft(
     if not goes_on:
         watch.note(f"starting from the rule of {name}")
         rule = without_prior_weights(model.rule, wanted.config.conditioning)
+        if trainer.scene.dimensions == 2:
+            rule = without_depth(rule)
         trainer.begin_with(rule, origins(model))
     return name
 
