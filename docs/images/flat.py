@@ -25,11 +25,11 @@ from vnca.rendering.colour import linear_to_srgb
 from vnca.rule.model import Model
 from vnca.training.motion_field import motion_field
 
-CELLS = 48
+CELLS = 40
 """Columns and rows of the texture."""
 PIXELS = 4
 """A cell."""
-FRAMES, WARM_UP = 24, 128
+FRAMES, WARM_UP = 16, 128
 """Pictures of the film, and steps before the first."""
 
 
