@@ -39,7 +39,7 @@ def with_output(rule: Rule) -> Rule:
     return replace(rule, output=output)
 
 
-@pytest.mark.parametrize("backend", ["reference", "numpy", "native"])
+@pytest.mark.parametrize("backend", ["reference", "numpy", "native", "wgsl"])
 def test_a_layer_is_the_plane_to_every_backend(rule: Rule, backend: str) -> None:
     """Written out with two-dimensional filters, a step is the same."""
     columns, rows, channels = 12, 9, rule.config.channels
