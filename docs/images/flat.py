@@ -29,7 +29,7 @@ CELLS = 40
 """Columns and rows of the texture."""
 PIXELS = 4
 """A cell."""
-FRAMES, WARM_UP = 16, 128
+FRAMES, WARM_UP = 12, 96
 """Pictures of the film, and steps before the first."""
 
 
