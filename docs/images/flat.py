@@ -3,7 +3,7 @@
     python docs/images/flat.py OUT PICTURE RUN FIELD [FIELD ...]
 
 RUN is of `vnca texture train PICTURE --dimensions 2 --motion-field …`. OUT is a film: the picture,
-cut to where its strokes are as large as in the texture, and the texture in each FIELD. For each
+at the size at which it was shown to the rule, and the texture in each FIELD. For each
 field it tells how far the motion that optical flow sees is from what was asked: of the direction,
 the mean cosine distance (0 is right, 1 is any, 2 is opposite), and the speed over that asked.
 """
@@ -50,7 +50,7 @@ def main(out: str, style: str, run: str, *fields: str) -> None:
 
 
 def exemplar(style: FloatArray, model: Model) -> FloatArray:
-    """The picture as large as the texture shows it, as much of it as fits."""
+    """The picture as large as the rule was shown it, as much of it as fits."""
     rows, columns = style.shape[:2]
     factor = float(model.training["picture_cells"]) * PIXELS / min(rows, columns)
     larger = resize(style, max(1, round(rows * factor)), max(1, round(columns * factor)))
