@@ -4,8 +4,8 @@ Run `python benchmarks/paper/night.py --out DIR`, or `make paper`. A study that 
 again, and one that was interrupted goes on with the rules that it has trained: so the same command
 goes on after an end of any kind. What fails is told, and the others are made. `--smallest` makes
 each study as small as it can be, to see that it works: its figures mean nothing, and are kept apart
-in `DIR/smallest`; of the methods two that need no training are run. Findings are in `DIR/findings`, a table a study, and `DIR/tables.md` has the
-paper's tables, filled from them.
+in `DIR/smallest`; of the methods two that need no training are run. Findings are in `DIR/findings`,
+a table a study, and `DIR/tables.md` has the paper's tables, filled from them.
 """
 
 import argparse
