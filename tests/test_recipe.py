@@ -188,7 +188,7 @@ def test_who_stops_asking_can_resume_too(cache: Path, model: Path, tmp_path: Pat
         ),
         ({"view": {"siz": 32}}, "`view.siz`: no such .*`view.size`"),
         ({"view": {"size": 3}}, "`view.size` 3"),
-        ({"preset": "best"}, "`preset` best: expected one of draft, paper, standard"),
+        ({"preset": "best"}, "`preset` best: expected one of draft, authors, paper, standard"),
         ({"resume": True}, "`resume`: needs the folder"),
         ({"texture": -1}, "`texture` -1"),
         ({"iterations": "many"}, "`iterations` 'many'"),

@@ -32,6 +32,8 @@ from vnca.training.config import PoolConfig, SmokeConfig, ViewConfig
 from vnca.training.presets import preset
 
 ROOT = Path(__file__).parents[2]
+AUTHORS = " + authors' scaling"
+"""What a table says of a preset with it."""
 REFERENCE = "reference"
 """The rule that nothing was taken from; all studies share it."""
 DRAFT = SmokeConfig(
@@ -55,6 +57,9 @@ class Study:
     """The picture."""
     full: bool = False
     """The preset `paper` on a GPU; else a small training."""
+    scaling: Literal["ours", "authors"] = "ours"
+    """How strongly cells perceive, and how weights begin: as the presets have it, or as the preset
+    `authors`, after the authors' later code."""
     iterations: int | None = None
     """Iterations of training, if not 400, or those of the preset."""
     size: int | None = None
@@ -85,6 +90,14 @@ class Study:
     def config(self) -> SmokeConfig:
         """That of the reference."""
         plan = preset(SmokeConfig, "paper") if self.full else DRAFT
+        if self.scaling == "authors":
+            theirs = preset(SmokeConfig, "authors")
+            rule = replace(
+                plan.rule,
+                sobel_divisor=theirs.rule.sobel_divisor,
+                laplacian_divisor=theirs.rule.laplacian_divisor,
+            )
+            plan = replace(plan, rule=rule, xavier_gain=theirs.xavier_gain)
         return replace(
             plan,
             iterations=plan.iterations if self.iterations is None else self.iterations,
@@ -187,7 +200,7 @@ class Findings:
             "study": name,
             "frame": study.frame.name,
             "style": study.style.name,
-            "preset": study.preset,
+            "preset": study.preset + (AUTHORS if study.scaling == "authors" else ""),
             "iterations": config.iterations,
             "size": config.view.size,
             "features": study.features,

@@ -1,9 +1,11 @@
-"""Solid textures from a trained rule and by optimising blocks, compared on the same pictures.
+"""Solid textures from a trained rule and by other methods, compared on the same pictures.
 
 Run `python benchmarks/texturing/compare.py --styles picture.jpg …`. For each picture a rule is
-trained and grown into blocks of all sizes; the baseline optimises a block of each size of
-`--sizes` for as long. Both are judged by the appearance loss on the same slices: along the axes,
-at angles that training draws, and at angles (`unseen`) that it never does. Each measurement runs
+trained and grown into blocks of all sizes, and so is the network of Gutierrez et al. 2020; a block
+of each size of `--sizes` is optimised, by gradient descent and as Kopf et al. 2007 do, for as long
+as these learn. `--methods` chooses among them. All are judged by the appearance loss on the same
+slices: along the axes, at angles that training draws, and at angles (`unseen`) that it never does.
+Slices along the axes are all that the other methods look at. Each measurement runs
 in a process of its own, whose peak memory is told, the libraries included. Times are processor
 seconds of all threads together: a busy machine favours neither.
 """
@@ -20,6 +22,8 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from gutierrez import Generator, on_demand, trained
+from kopf import kopf_blocks
 from solid import optimised_blocks
 
 from vnca.bench import append_csv, run_facts, write_json
@@ -35,6 +39,8 @@ from vnca.rule.model import Model
 from vnca.training.config import TextureConfig
 from vnca.training.presets import preset, preset_names
 from vnca.training.trainers import texture_trainer
+
+METHODS = ("automaton", "gutierrez", "optimised", "kopf")
 
 
 @dataclass(frozen=True)
@@ -109,11 +115,39 @@ def grown(task: Task, rule: Rule, size: int) -> dict[str, Any]:
     return {"make_s": round(made, 1), "peak_mb": peak_mb(), **judged(task, block, style, network)}
 
 
-def optimised(task: Task, size: int) -> dict[str, Any]:
-    """A block of the baseline, and how near its slices come."""
+def learned(task: Task) -> tuple[Generator, dict[str, Any]]:
+    """The network of Gutierrez et al., trained for the time given."""
+    style, network = task.begin()
+    cells = task.judge(style, network).style_scale * task.slice_size
+    steps = trained(style, network, cells=cells, slice_size=task.slice_size, seed=task.seed)
+    began = time.process_time()
+    for iterations, generator in zip(count(1), steps, strict=False):  # noqa: B007
+        if task.done(began, iterations):
+            break
+    spent = round(time.process_time() - began, 1)
+    return generator, {"iterations": iterations, "learn_s": spent}
+
+
+def demanded(task: Task, generator: Generator, size: int) -> dict[str, Any]:
+    """A block of that network, and how near its slices come."""
+    style, network = task.begin()
+    began = time.process_time()
+    block = on_demand(generator, size, seed=task.seed)
+    made = time.process_time() - began
+    return {"make_s": round(made, 1), "peak_mb": peak_mb(), **judged(task, block, style, network)}
+
+
+def optimised(task: Task, method: str, size: int) -> dict[str, Any]:
+    """A block of a method that optimises it, and how near its slices come."""
     style, network = task.begin()
     appearance = task.judge(style, network)
-    blocks = optimised_blocks(style, appearance, size, slice_size=task.slice_size, seed=task.seed)
+    if method == "kopf":
+        cells = appearance.style_scale * task.slice_size
+        blocks = kopf_blocks(style, size, cells=cells, seed=task.seed)
+    else:
+        blocks = optimised_blocks(
+            style, appearance, size, slice_size=task.slice_size, seed=task.seed
+        )
     began = time.process_time()
     for iterations, block in zip(count(1), blocks, strict=False):  # noqa: B007
         if task.done(began, iterations):
@@ -162,11 +196,12 @@ def main() -> None:
     parser.add_argument(
         "--runs", type=Path, nargs="+", metavar="RUN", help="one a picture, instead of training"
     )
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
     parser.add_argument(
         "--sizes", type=int, nargs="*", default=[64, 128], help="of blocks by both methods"
     )
     parser.add_argument(
-        "--grow", type=int, nargs="*", default=[256], help="further sizes for the rule alone"
+        "--grow", type=int, nargs="*", default=[256], help="further sizes for what learns"
     )
     parser.add_argument("--preset", choices=preset_names(TextureConfig), default="draft")
     parser.add_argument(
@@ -208,16 +243,23 @@ def main() -> None:
             style, options.preset, options.features, options.threads, options.seconds,
             options.iterations, options.slices, options.steps, options.seed,
         )  # fmt: skip
-        if options.runs:
-            model = Model.load(options.runs[place])
-            rule = model.rule
-            learned = {"iterations": model.training.get("iterations"), "learn_s": "given"}
-        else:
-            rule, learned = alone(train, task)
-        for size in [*options.sizes, *options.grow]:
-            tell(task, "automaton", size, {**learned, **alone(grown, task, rule, size)})
-        for size in options.sizes:
-            tell(task, "optimised", size, alone(optimised, task, size))
+        sizes = [*options.sizes, *options.grow]
+        if "automaton" in options.methods:
+            if options.runs:
+                model = Model.load(options.runs[place])
+                rule = model.rule
+                cost = {"iterations": model.training.get("iterations"), "learn_s": "given"}
+            else:
+                rule, cost = alone(train, task)
+            for size in sizes:
+                tell(task, "automaton", size, {**cost, **alone(grown, task, rule, size)})
+        if "gutierrez" in options.methods:
+            generator, cost = alone(learned, task)
+            for size in sizes:
+                tell(task, "gutierrez", size, {**cost, **alone(demanded, task, generator, size)})
+        for method in ("optimised", "kopf"):
+            for size in options.sizes if method in options.methods else ():
+                tell(task, method, size, alone(optimised, task, method, size))
 
     if options.json is not None:
         write_json(options.json, facts, rows)

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 import tyro
 
-from vnca.cli import COMMANDS, bench, peers, texture
+from vnca.cli import COMMANDS, bench, peers, textures
 from vnca.cli.help import COMMON, SHORT
 
 Vnca = Callable[..., Any]
-INSIDE = {"bench": bench.COMMANDS, "peers": peers.COMMANDS, "texture": texture.COMMANDS}
+INSIDE = {"bench": bench.COMMANDS, "peers": peers.COMMANDS, "texture": textures.COMMANDS}
 CALLS = [
     [name, *inside]
     for name in COMMANDS

@@ -65,3 +65,14 @@ def test_a_rule_of_another_shape_is_refused_or_left_out(style: FloatArray) -> No
     model = vnca.texture(style, graft="auto", watch=watch, **other)
     assert model.training["graft"] is None
     assert any("starts from nothing" in line for line in watch.lines)
+
+
+def test_a_flat_texture_starts_from_a_solid_one_without_its_depth(style: FloatArray) -> None:
+    grafted = vnca.texture(style, graft="ink", dimensions=2, motion_field="circular", **SMALL)
+    channels = grafted.rule.config.channels
+    ours, theirs = grafted.rule.hidden, load_style("ink").rule.hidden
+    depth = slice(2 * channels, 3 * channels)
+    assert not ours[:, depth].any()
+    for kept in (slice(0, 2 * channels), slice(3 * channels, 5 * channels)):
+        np.testing.assert_allclose(ours[:, kept], theirs[:, kept], atol=1e-6)
+    assert grafted.training["motion_field"] == "circular"

@@ -16,7 +16,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def test_the_package_has_presets_for_smoke_and_textures() -> None:
-    assert preset_names(SmokeConfig) == ["draft", "paper", "standard"]
+    assert preset_names(SmokeConfig) == ["draft", "authors", "paper", "standard"]
     assert preset_names(TextureConfig) == ["draft", "standard"]
 
 
@@ -55,7 +55,7 @@ def test_what_a_base_chooses_can_be_left_to_the_training_again(file: Path) -> No
     ("text", "told"),
     [
         ("iterations = 5", "rule.channels and "),
-        ('base = "best"', "base = 'best': expected one of draft, paper, standard"),
+        ('base = "best"', "base = 'best': expected one of draft, authors, paper, standard"),
         ('base = "draft"\niterations = "many"', "iterations 'many': expected a whole number"),
         ('base = "draft"\niterations = true', "iterations True: expected a whole number"),
         ('base = "draft"\niterations = 0', "iterations 0: at least 1"),

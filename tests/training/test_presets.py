@@ -11,7 +11,7 @@ from vnca.core.volume import Volume
 from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceLoss
 from vnca.rendering.colour import linear_to_srgb
-from vnca.rule import Rule
+from vnca.rule import Rule, Scales
 from vnca.training.config import SmokeConfig
 from vnca.training.presets import preset, preset_names
 from vnca.training.scenes.smoke import SmokeScene
@@ -75,3 +75,16 @@ def test_the_papers_preset_shows_smoke_as_bright_as_its_colour(tiny_smoke: Volum
     inside = view.opacity > 0.95
     assert inside.sum() > 50
     assert 0.7 < float(view.colour[inside].mean()) < 1.3
+
+
+def test_the_authors_scaling_perceives_more_and_begins_smaller() -> None:
+    theirs, papers = preset(SmokeConfig, "authors"), preset(SmokeConfig, "paper")
+    rule = replace(papers.rule, sobel_divisor=2.0, laplacian_divisor=8.0)
+    assert theirs == replace(papers, rule=rule, xavier_gain=0.2)
+    plain, normal = (
+        Rule.initial(theirs.rule, Scales(), seed=0, xavier_gain=gain).hidden for gain in (0.0, 0.2)
+    )
+    fans = sum(normal.shape)
+    assert normal.std() == pytest.approx(0.2 * (2 / fans) ** 0.5, rel=0.02)
+    assert abs(normal).max() > 3 * normal.std()  # not uniform
+    assert plain.std() > 5 * normal.std()

@@ -18,7 +18,7 @@ COMMANDS = {
     "simulate": "write a smoke simulation to play with",
     "train": "learn a rule from one frame of smoke and one picture",
     "stylize": "paint a smoke sequence with a trained rule",
-    "texture": "grow solid textures and put them on meshes",
+    "texture": "grow textures: solid ones to put on meshes, flat ones to film",
     "evaluate": "measure how well a rule paints a sequence, in a report",
     "ablate": "train without parts of the method, and measure what these do",
     "compare": "paint the same smoke with several methods, and judge them alike",
@@ -34,6 +34,7 @@ COMMANDS = {
 HOMES = {name: f"{name}:run" for name in COMMANDS} | {
     "styles": "info:run_styles",
     "stylize": "paint:run_stylize",
+    "texture": "textures:run",
     "render": "paint:run_render",
     "ablate": "evaluate:run_ablate",
     "sweep": "farm:run_sweep",

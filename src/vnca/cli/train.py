@@ -41,7 +41,8 @@ class Train(smoke.SmokeRun):
     ] = ()
     """Further pictures, up to eight in all."""
     preset: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = DEFAULT
-    """Values of all hyperparameters that are not given: draft, standard, paper, or a TOML file."""
+    """Values of all hyperparameters that are not given: draft, standard, paper, authors, or a TOML
+    file."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: SmokeConfig = field(default_factory=SmokeConfig)

@@ -43,10 +43,10 @@ class _Decoded(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A block of solid texture, which tiles space.
+    """A block of solid texture, which tiles space; a layer of one is a flat texture.
 
     Attributes:
-        colours: Linear RGB `[s, s, s, 3]` of its cells.
+        colours: Linear RGB `[x, y, z, 3]` of its cells.
     """
 
     colours: FloatArray
@@ -75,11 +75,11 @@ class Block:
             return _parts(self._decoded, factor)
         if factor == 1:
             return self.colours
-        size = factor * len(self)
+        size = tuple(factor * cells for cells in self.colours.shape[:3])
         # Part i of the finer grid is centred there.
-        along = (np.arange(size) + 0.5) / factor - 0.5
-        points = np.stack(np.meshgrid(along, along, along, indexing="ij"), -1).reshape(-1, 3)
-        return sample_block(self.colours, points).reshape(size, size, size, 3)
+        along = ((np.arange(parts) + 0.5) / factor - 0.5 for parts in size)
+        points = np.stack(np.meshgrid(*along, indexing="ij"), -1).reshape(-1, 3)
+        return sample_block(self.colours, points).reshape(*size, 3)
 
     def at(self, points: AnyArray, width: float = 0.0) -> FloatArray:
         """Linear RGB `[n, 3]` at points in cells, whose centres lie on whole numbers.
@@ -125,10 +125,27 @@ def grow(
         compute: How steps are computed.
         watch: Is called after each step.
     """
-    compute = compute or Compute()
     domain, rule = block_domain(size), in_style(rule)
     nothing = np.zeros((len(domain), rule.config.conditioning_width), np.float32)
-    session = open_session(rule.automaton(seed), domain, nothing, compute)
+    yield from lives(
+        rule, domain, nothing, steps=steps, seed=seed, pause=pause, compute=compute, watch=watch
+    )
+
+
+def lives(
+    rule: Rule,
+    domain: Domain,
+    conditioning: FloatArray,
+    *,
+    steps: int,
+    seed: int,
+    pause: int,
+    compute: Compute | None,
+    watch: Callable[[], None] | None,
+) -> Iterator[Block]:
+    """What grows on any cells that tile space, as `grow` says, conditioned by `[n, P]`."""
+    compute = compute or Compute()
+    session = open_session(rule.automaton(seed), domain, conditioning, compute)
     between = Between(rule, compute.backend, threads=compute.threads)
     state = session.upload(domain.seed(rule.config.channels))
     done, waiting = 0, steps
@@ -139,12 +156,12 @@ def grow(
 
 
 def sample_block(block: FloatArray, points: AnyArray) -> FloatArray:
-    """Colours `[n, c]` of a block `[s, s, s, c]` that tiles space, at points in cells.
+    """Colours `[n, c]` of a block `[x, y, z, c]` that tiles space, at points in cells.
 
     Trilinear between cell centres, which lie on whole numbers.
     """
-    size = len(block)
-    flat = block.reshape(size**3, -1)
+    size = block.shape[:3]
+    flat = block.reshape(-1, block.shape[3])
     found = np.empty((len(points), flat.shape[1]), np.float32)
     for start in range(0, len(points), 1 << 18):
         part = np.asarray(points[start : start + (1 << 18)])
@@ -156,7 +173,7 @@ def sample_block(block: FloatArray, points: AnyArray) -> FloatArray:
         for corner in np.ndindex(2, 2, 2):
             x, y, z = (np.where(c, far[:, k], near[:, k]) for k, c in enumerate(corner))
             weight = np.prod(np.where(corner, share, 1 - share), axis=1)
-            total += weight[:, None] * flat[(x * size + y) * size + z]
+            total += weight[:, None] * flat[(x * size[1] + y) * size[2] + z]
         found[start : start + (1 << 18)] = total
     return found
 
@@ -180,8 +197,7 @@ def _parts(decoded: _Decoded, factor: int) -> FloatArray:
     values = []
     for _, seen in parts_of_cells(between, state, domain, factor):
         values.append(colour_means(seen))
-    cells, size = domain.box.shape[0], factor * domain.box.shape[0]
     parts = np.concatenate(values).reshape(len(domain), *3 * (factor,), 3)
-    dense = domain.scatter(parts, domain.box)
-    dense = dense.reshape(*3 * (cells,), *3 * (factor,), 3).transpose(0, 3, 1, 4, 2, 5, 6)
-    return np.ascontiguousarray(dense).reshape(size, size, size, 3)
+    dense = domain.scatter(parts, domain.box).transpose(0, 3, 1, 4, 2, 5, 6)
+    size = (factor * cells for cells in domain.box.shape)
+    return np.ascontiguousarray(dense).reshape(*size, 3)

@@ -73,7 +73,8 @@ class SmokeRun(TrainingOptions):
     """Further pictures, up to eight in all: the rule learns them all and mixes them as it is told
     when it paints (`style_mix`). For K pictures there are √K times as many iterations."""
     preset: str = DEFAULT
-    """Values of all hyperparameters that are not given: draft, standard, paper, or a TOML file."""
+    """Values of all hyperparameters that are not given: draft, standard, paper, authors, or a TOML
+    file."""
     init: Path | None = None
     """A model that is trained already, to begin with instead of training a texture as `texture`
     says: a solid texture of the picture, or a model of smoke, which goes on learning."""

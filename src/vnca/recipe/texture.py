@@ -1,4 +1,4 @@
-"""Training of a solid texture from one picture: for itself, or to begin training on smoke with.
+"""Training of a texture from one picture: for itself, or to begin training on smoke with.
 
 On smoke a rule learns first what the priors offer: a colour for each density and velocity, and
 grain. In a block, where nothing tells cells apart, it has to learn patterns; from there it goes
@@ -25,6 +25,7 @@ from vnca.io.mesh import Mesh, read_mesh
 from vnca.io.picture import read_style
 from vnca.io.smoke_format import UpAxis
 from vnca.painting.block import KIND
+from vnca.painting.flat import without_depth
 from vnca.recipe import SILENT, PictureGiven, Watch, given_pictures, told_of_styles
 from vnca.recipe.session import (
     ResumeOptions,
@@ -43,6 +44,7 @@ from vnca.rule.styles import in_style
 from vnca.training.checkpoint import Checkpoint, fingerprints
 from vnca.training.config import SmokeConfig, TextureConfig
 from vnca.training.loop import Trainer
+from vnca.training.motion_field import motion_asked, told_of_motion, with_motion
 from vnca.training.presets import DEFAULT
 from vnca.training.presets import preset as preset_of
 from vnca.training.styles import shared_out, told_styles
@@ -190,6 +192,8 @@ def graft(
     if not goes_on:
         watch.note(f"starting from the rule of {name}")
         rule = without_prior_weights(model.rule, wanted.config.conditioning)
+        if trainer.scene.dimensions == 2:
+            rule = without_depth(rule)
         trainer.begin_with(rule, origins(model))
     return name
 
@@ -199,7 +203,7 @@ COMMAND = "texture train"
 
 @dataclass(frozen=True, kw_only=True)
 class TextureRun(TrainingOptions):
-    """A training of a solid texture from one picture."""
+    """A training of a texture from one picture."""
 
     style: Path
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
@@ -210,6 +214,9 @@ class TextureRun(TrainingOptions):
     """Look at this mesh too while training: GLB, OBJ, PLY or STL."""
     up_axis: UpAxis | None = None
     """The mesh's up axis; y for OBJ and GLB, z for PLY and STL unless given."""
+    motion_field: str | None = None
+    """How a flat texture (`dimensions` 2) is to move: circular, hyperbolic, … by name, a file of
+    vectors (.npy, .flo, .exr), or a film whose mean motion is taken."""
     preset: str = DEFAULT
     """Values of all hyperparameters that are not given: draft, standard, or a TOML file."""
     config: TextureConfig = field(default_factory=TextureConfig)
@@ -226,6 +233,8 @@ class ResumeTextureRun(ResumeOptions):
     """The further pictures, if they are no longer where they were."""
     mesh: Path | None = None
     """The mesh, if it is no longer where it was."""
+    motion_field: str | None = None
+    """The file of the motion field, if it is no longer where it was."""
 
 
 def texture(
@@ -234,6 +243,7 @@ def texture(
     out: str | Path | None = None,
     mesh: str | Path | None = None,
     up_axis: UpAxis | None = None,
+    motion_field: str | None = None,
     preset: str | Path = DEFAULT,
     overwrite: bool = False,
     preview_every: int = 50,
@@ -242,7 +252,7 @@ def texture(
     watch: Watch = SILENT,
     **options: Any,
 ) -> Model:
-    """Learn a solid texture from one picture, as `vnca texture train` does.
+    """Learn a texture from one picture, solid or flat, as `vnca texture train` does.
 
     Args:
         style: A picture file, or an array `[r, c, 3]` of linear RGB from 0 to 1; or a list of up to
@@ -251,6 +261,8 @@ def texture(
             given.
         mesh: A mesh file to look at, too, while training.
         up_axis: The mesh's; y for OBJ and GLB, z for PLY and STL unless given.
+        motion_field: How a flat texture (`dimensions=2`) is to move: a name, such as circular, a
+            file of vectors, or a film.
         preset: `draft` takes minutes, `standard` hours; or the path of a TOML file.
         overwrite: Replace the run that `out` holds.
         preview_every: Iterations between preview pictures.
@@ -271,6 +283,7 @@ def texture(
         out=None if out is None else Path(out),
         mesh=None if mesh is None else Path(mesh),
         up_axis=up_axis,
+        motion_field=motion_field,
         preset=str(preset),
         overwrite=overwrite,
         preview_every=preview_every,
@@ -305,6 +318,10 @@ def run(
     device = choose_device(options.device)
     mesh = read_mesh(options.mesh, options.up_axis) if options.mesh else None
     config = shared_out(told_styles(options.config, styles), len(styles))
+    motion = motion_asked(config, options.motion_field)
+    config = with_motion(config, motion)
+    if mesh is not None and config.dimensions == 2:
+        raise OptionError(f"`mesh` {options.mesh}: a flat texture is not seen on meshes")
     if len(styles) > 1:
         watch.note(f"{len(styles)} styles: {config.iterations} iterations")
     require_equal_runs(device)
@@ -312,7 +329,13 @@ def run(
     with fitting(config, "this block"):
         budget = memory_budget(options.memory_budget)
         trainer = texture_trainer(
-            styles, config, network, mesh=mesh, device=device, memory_budget=budget
+            styles,
+            config,
+            network,
+            mesh=mesh,
+            motion_field=motion,
+            device=device,
+            memory_budget=budget,
         )
     has_begun = checkpoint is not None and bool(checkpoint.training)
     started_from = graft(trainer, config.graft, styles[0], watch, goes_on=has_begun)
@@ -323,6 +346,7 @@ def run(
         "graft": started_from,
         "preset": Path(options.preset).name,
         "block": config.block,
+        **told_of_motion(config, motion),
         "seed": config.seed,
         "device": str(device),
     }
@@ -335,7 +359,13 @@ def run(
         folder=folder,
         styles=styles,
         training=training,
-        inputs=fingerprints(styles, config, network, mesh=_surfaces(mesh)),
+        inputs=fingerprints(
+            styles,
+            config,
+            network,
+            mesh=_surfaces(mesh),
+            **({} if motion is None else {"motion field": [motion.velocity(32, 32, 1.0)]}),
+        ),
         watch=watch,
     )
     return session.run(checkpoint)

@@ -283,13 +283,26 @@ class Rule:
             )
 
     @classmethod
-    def initial(cls, config: RuleConfig, scales: Scales, *, seed: int) -> "Rule":
-        """A rule before training: W1 uniform (He), b1 and W2 zero, so that nothing changes yet."""
+    def initial(
+        cls, config: RuleConfig, scales: Scales, *, seed: int, xavier_gain: float = 0.0
+    ) -> "Rule":
+        """A rule before training: b1 and W2 zero, so that nothing changes yet.
+
+        Args:
+            config: Its shape.
+            scales: Its normalisers.
+            seed: Of the random numbers.
+            xavier_gain: W1 is normal with this gain (Glorot and Bengio 2010); uniform (He) at 0.
+        """
         bound = np.sqrt(6 / config.inputs)
         random = np.random.default_rng(seed)
         shape = (config.hidden, config.inputs)
+        if xavier_gain:
+            hidden = random.normal(0, xavier_gain * np.sqrt(2 / sum(shape)), shape)
+        else:
+            hidden = random.uniform(-bound, bound, shape)
         return cls(
-            hidden=random.uniform(-bound, bound, shape).astype(np.float32),
+            hidden=hidden.astype(np.float32),
             bias=np.zeros(config.hidden, dtype=np.float32),
             output=np.zeros((config.channels, config.hidden), dtype=np.float32),
             config=config,

@@ -62,6 +62,9 @@ class TrainingConfig(ABC):
     iterations: a style of the library, a model, auto for the nearest style that fits, or none."""
     iterations: int = 400
     """Iterations of training."""
+    xavier_gain: float = 0.0
+    """Begin with a hidden layer of Xavier's normal distribution with this gain, as the authors'
+    later code does with 0.2; 0 for He's uniform one."""
     learning_rate: float = 3e-3
     """Adam's learning rate at its highest."""
     rate_warmup: int = 15
@@ -94,6 +97,8 @@ class TrainingConfig(ABC):
             raise OptionError(f"`decoder` {self.decoder}: must be from 0 to 128 units")
         if self.iterations < 1:
             raise OptionError(f"`iterations` {self.iterations}: at least 1 is needed")
+        if not 0 <= self.xavier_gain < inf:
+            raise OptionError(f"`xavier_gain` {self.xavier_gain}: must not be negative")
         if not (0 < self.learning_rate < inf and 0 < self.decay < inf):
             raise OptionError("`learning_rate` and `decay` must be positive")
         if self.rate_warmup < 0:
@@ -272,8 +277,11 @@ _COLOURS = AppearanceConfig(grey=False, samples=512)
 
 @dataclass(frozen=True)
 class TextureConfig(TrainingConfig):
-    """How a rule for a solid texture is trained."""
+    """How a rule for a texture is trained, solid or flat."""
 
+    dimensions: Literal[2, 3] = 3
+    """3 for a solid texture, which meshes are carved out of; 2 for a flat one, of which the picture
+    itself is seen, and which may move."""
     rule: RuleConfig = _PLAIN
     """The shape of the rule."""
     appearance: AppearanceConfig = _COLOURS
@@ -289,16 +297,26 @@ class TextureConfig(TrainingConfig):
     """How the block is looked at."""
     block: int = 32
     """Cells along an edge of the block that is trained on; patterns are smaller than it."""
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    """Of a flat texture with a motion field: what the seen motion is compared with."""
+    motion_speed: float = 0.5
+    """Cells a frame by which a flat texture moves where its motion field is fastest."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         rule = self.rule
-        if rule.position_prior or rule.density_prior or rule.velocity_prior:
+        if (
+            rule.position_prior
+            or rule.density_prior
+            or (rule.velocity_prior and self.dimensions == 3)
+        ):
             raise OptionError(
-                "`position_prior`, `density_prior`, `velocity_prior`: a solid texture has none"
+                "`position_prior`, `density_prior`, `velocity_prior`: a texture has none"
             )
+        if not 0 < self.motion_speed < inf:
+            raise OptionError(f"`motion_speed` {self.motion_speed}: must be positive")
         if self.appearance.shows_density:
-            raise OptionError("`appearance.grey_source` density: a solid texture has no density")
+            raise OptionError("`appearance.grey_source` density: a texture has no density")
         if not SMALLEST <= self.block <= LARGEST:
             raise OptionError(f"`block` {self.block}: must be from {SMALLEST} to {LARGEST} cells")
 

@@ -5,6 +5,7 @@ Reference: VNCA sections 3.4 and 5.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from vnca.engine.automaton import DecoderWeights as Decoded
 from vnca.engine.automaton import Weights
 from vnca.features import FeatureNetwork
 from vnca.losses.appearance import AppearanceLoss
+from vnca.painting.flat import depth_columns
 from vnca.rule import DENSITY_CHANGE, Decoder, Rule
 from vnca.training import Snapshot, count
 from vnca.training.config import TrainingConfig
@@ -103,6 +105,10 @@ class Trainer:
         self._decoder = scene.decoder
         for tensor in self._decoder or ():
             tensor.requires_grad_()
+        if scene.dimensions == 2:
+            self._weights.hidden.register_hook(
+                partial(_without_columns, columns=depth_columns(config.rule.channels))
+            )
         if not scene.paints_density:
             self._weights.output.register_hook(_without_density)
             if self._decoder is not None:
@@ -329,6 +335,13 @@ class Trainer:
 
 def _array(tensor: Tensor) -> FloatArray:
     return tensor.detach().cpu().numpy().copy()
+
+
+def _without_columns(gradient: Tensor, columns: slice) -> Tensor:
+    """The gradient of W1, without that of inputs that are always zero but for rounding."""
+    gradient = gradient.clone()
+    gradient[:, columns] = 0
+    return gradient
 
 
 def _without_density(gradient: Tensor) -> Tensor:

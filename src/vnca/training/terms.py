@@ -32,7 +32,8 @@ from vnca.losses.appearance import AppearanceLoss
 from vnca.rule import DENSITY_CHANGE
 from vnca.training import Snapshot
 from vnca.training.scenes import Scene
-from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
+from vnca.training.scenes.flat import FlatScene
+from vnca.training.scenes.smoke import SmokeScene
 from vnca.training.styles import WHOLE, Judged
 
 
@@ -236,7 +237,7 @@ class MotionSupervision(Term):
         if not seen.before.any():
             return {}
         appearance = float(seen.sums["appearance"].detach())
-        assert isinstance(seen.scene, SmokeScene), "only smoke moves"
+        assert isinstance(seen.scene, SmokeScene | FlatScene), "nothing else moves"
         loss = self.loss(
             seen.scene,
             seen.before,
@@ -250,28 +251,30 @@ class MotionSupervision(Term):
 
     def loss(
         self,
-        scene: SmokeScene,
+        scene: SmokeScene | FlatScene,
         before: Tensor,
         after: Tensor,
-        viewpoint: SmokeViewpoint,
+        viewpoint: Any,
         background: Tensor,
         *,
         frames: float,
         appearance: float,
     ) -> Tensor:
-        """How the texture moved in a rollout, against how the smoke moves in that time, weighted.
+        """How the texture moved in a rollout, against how it is to in that time, weighted.
 
         Args:
             scene: That the rollout was in.
             before: The state at its start, `[n + 1, C]`.
-            after: The picture of its end, sRGB `[1, 3, r, c]`; differentiable.
-            viewpoint: Where the picture was taken from.
+            after: Pictures of its end, sRGB `[b, 3, r, c]`, of which the first is compared;
+                differentiable.
+            viewpoint: Where they were taken from.
             background: What is behind, linear RGB `[3]`.
             frames: Frames that pass in the rollout, n / N.
             appearance: The appearance loss of this iteration.
         """
         with torch.no_grad():
             earlier, _ = scene.pictures(before, viewpoint, background)
+        earlier, after = earlier[:1], after[:1]
         size = min(self.config.size, after.shape[-1])
         target, opacity = scene.motion(before, viewpoint, size)
         motion = self.compare(earlier, after, target, opacity, frames=frames)

@@ -17,9 +17,11 @@ from vnca.features import FeatureNetwork
 from vnca.features.flow import FlowNetwork
 from vnca.io.mesh import Mesh
 from vnca.io.smoke_format import on_lattice
+from vnca.painting.flat import MotionField, without_depth
 from vnca.rule import Rule, Scales, density_scale, gamma_for_cell_opacity, gamma_for_own_colour
 from vnca.training.config import SmokeConfig, TextureConfig, ViewConfig
 from vnca.training.loop import Trainer
+from vnca.training.scenes.flat import FlatScene
 from vnca.training.scenes.smoke import SmokeScene, velocity_scale
 from vnca.training.scenes.texture import BlockScene
 from vnca.training.styles import told_styles
@@ -54,7 +56,12 @@ def smoke_trainer(
     what = f"frame {smoke.frame}"
     smoke = on_lattice(smoke, Lattice.of(smoke.index_to_world, what), what)
     config = told_styles(config, style)
-    rule = Rule.initial(config.rule, choose_scales(smoke, config), seed=config.seed)
+    rule = Rule.initial(
+        config.rule,
+        choose_scales(smoke, config),
+        seed=config.seed,
+        xavier_gain=config.xavier_gain,
+    )
     rule = replace(rule, decoder=config.initial_decoder())
     scene = SmokeScene(
         smoke, rule, config.view, augment=config.augment, device=device, backend=config.backend
@@ -90,16 +97,20 @@ def texture_trainer(
     network: FeatureNetwork,
     *,
     mesh: Mesh | None = None,
+    motion_field: MotionField | None = None,
     device: torch.device | str = "cpu",
     memory_budget: int | None = None,
 ) -> Trainer:
     """What trains a rule to grow blocks that look like a picture wherever they are cut.
 
+    In two dimensions it is layers that look like the picture, and move if they are to.
+
     Args:
         style: Linear RGB `[r, c, 3]`; or several, which the rule learns all.
         config: The hyperparameters.
         network: The frozen network that judges pictures.
-        mesh: Looked at beside the slices.
+        mesh: Looked at beside the slices, of a solid texture.
+        motion_field: How a flat texture is to move; the rule is told it.
         device: Where to compute.
         memory_budget: Bytes that the program may take; see `Trainer`.
 
@@ -108,6 +119,24 @@ def texture_trainer(
     """
     config = told_styles(config, style)
     rule = initial_rule(config)
+    if config.dimensions == 2:
+        velocity = None
+        if motion_field is not None:
+            velocity = motion_field.velocity(config.block, config.block, config.motion_speed)
+        scene = FlatScene(
+            config.block,
+            config.slice,
+            rule,
+            velocity=velocity,
+            device=device,
+            backend=config.backend,
+        )
+        terms = []
+        if scene.moves and config.motion.weight:
+            terms.append(MotionSupervision(config.motion, FlowNetwork.load(device)))
+        return Trainer(
+            scene, rule, style, config, network, terms=terms, memory_budget=memory_budget
+        )
     scene = BlockScene(
         config.block,
         config.slice,
@@ -126,7 +155,10 @@ def initial_rule(config: TextureConfig) -> Rule:
     Where no prior tells cells anything, a block of zeros is perceived as zeros: without biases
     the hidden layer would stay silent, and its output weights without a gradient.
     """
-    rule = Rule.initial(config.rule, Scales(), seed=config.seed)
+    is_flat = config.dimensions == 2
+    scales = Scales(velocity=config.motion_speed) if is_flat else Scales()
+    rule = Rule.initial(config.rule, scales, seed=config.seed, xavier_gain=config.xavier_gain)
+    rule = without_depth(rule) if is_flat else rule
     bound = config.rule.inputs**-0.5
     random = np.random.default_rng(config.seed)
     bias = random.uniform(-bound, bound, rule.bias.shape).astype(np.float32)

@@ -6,7 +6,15 @@ from pathlib import Path
 import pytest
 
 STUDIES = Path(__file__).parents[3] / "benchmarks" / "paper"
-SCRIPTS = ("density", "views", "motion_weight", "generalisation", "brightness", "cost")
+SCRIPTS = (
+    "density",
+    "velocity",
+    "views",
+    "motion_weight",
+    "generalisation",
+    "brightness",
+    "cost",
+)
 
 
 @pytest.mark.slow

@@ -30,11 +30,13 @@ class Scene(ABC, Generic[Viewpoint]):
             interpolated.
         samples: About how many are taken along the ray of a pixel.
         width: Cells across a picture.
+        dimensions: In a layer of two, the weights of the gradient along y are never trained.
         paints_density: Whether a rule may change the density. If not, its weights that would do
             so are never trained.
     """
 
     samples = 1.0
+    dimensions = 3
     paints_density = True
 
     def __init__(

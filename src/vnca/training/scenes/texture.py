@@ -18,6 +18,7 @@ from torch.nn import functional
 
 from vnca.core import BoolArray, FloatArray
 from vnca.core.camera import Orthographic, view_axes
+from vnca.engine.domain import Domain
 from vnca.io.mesh import Mesh
 from vnca.meshes import visible
 from vnca.painting.block import block_domain
@@ -161,6 +162,7 @@ class BlockScene(Scene[list[Cut]]):
         slices: SliceConfig,
         *,
         conditioning_width: int = PRIORS,
+        domain: Domain | None = None,
         mesh: Mesh | None = None,
         decoder: Decoder | None = None,
         device: torch.device | str = "cpu",
@@ -172,6 +174,7 @@ class BlockScene(Scene[list[Cut]]):
             size: Cells along an edge.
             slices: How it is looked at.
             conditioning_width: Numbers that a cell is conditioned on: all are zero here.
+            domain: Cells that tile space; all of the block unless given.
             mesh: Seen from all sides beside the slices.
             decoder: What is seen between cells; they are interpolated unless given.
             device: Where rollouts and pictures are computed.
@@ -180,7 +183,7 @@ class BlockScene(Scene[list[Cut]]):
         Raises:
             OptionError: If the size cannot work.
         """
-        domain = block_domain(size)
+        domain = domain or block_domain(size)
         nothing = np.zeros((len(domain), conditioning_width), np.float32)
         super().__init__(
             domain, nothing, device, width=slices.cells, decoder=decoder, backend=backend
@@ -247,6 +250,11 @@ class BlockScene(Scene[list[Cut]]):
             views.append(colour.cpu().numpy())
         return views
 
+    def angles(self, random: np.random.Generator) -> Angles:
+        """Of a slice, drawn at random."""
+        oblique = random.uniform() < self.slices.oblique
+        return oblique_angles(random) if oblique else axis_angles(random)
+
     def _cut(self, random: np.random.Generator) -> Cut:
         device = self.priors.device
         middle = random.uniform(0, self.domain.box.shape[0], 3)
@@ -254,8 +262,7 @@ class BlockScene(Scene[list[Cut]]):
             view = self.views[int(random.integers(len(self.views)))]
             points = torch.from_numpy(view.points + middle.astype(np.float32))
             return Cut(points.to(device), torch.from_numpy(view.covered).to(device))
-        oblique = random.uniform() < self.slices.oblique
-        angles = oblique_angles(random) if oblique else axis_angles(random)
+        angles = self.angles(random)
         across = self.slices.size * self.slices.supersampling
         spacing = self.slices.cells / across * self.slices.zoom ** random.uniform(-1, 1)
         points = slice_points(angles, middle, size=across, spacing=spacing)

@@ -1,4 +1,4 @@
-"""`vnca texture {train,bake,volume,turntable}`: solid textures for meshes."""
+"""`vnca texture {train,bake,volume,turntable,film}`: textures, solid for meshes, and flat."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -34,14 +34,16 @@ from vnca.rule.paint import require_refinement
 from vnca.rule.styles import alone, style_number
 
 COMMANDS = {
-    "train": "learn a solid texture from one picture",
+    "train": "learn a texture from one picture, solid or flat",
     "bake": "put a solid texture on a mesh",
     "volume": "write the block of a solid texture as a volume",
     "turntable": "film a textured mesh while it turns",
+    "film": "film a flat texture, or write its pictures",
 }
 _HOMES = {
     "train": "train:run_texture",
-    **{name: f"texture:run_{name}" for name in ("bake", "volume", "turntable")},
+    **{name: f"textures:run_{name}" for name in ("bake", "volume", "turntable")},
+    "film": "textures.film:run",
 }
 BAKED = (".glb", ".ply")
 VOLUMES = (".vdb", ".npz")
@@ -49,16 +51,14 @@ VOLUMES = (".vdb", ".npz")
 
 def run(arguments: Sequence[str]) -> None:
     """Run one of the subcommands."""
-    purpose = "Grow solid textures and put them on meshes."
+    purpose = "Grow textures: solid ones, to put on meshes, and flat ones, to film."
     run_subcommand("texture", purpose, COMMANDS, _HOMES, arguments)
 
 
 @dataclass(frozen=True)
-class BlockConfig:
-    """The block that is grown."""
+class GrowthConfig:
+    """How a texture is grown."""
 
-    block: int = 128
-    """Cells along an edge of the block; the larger, the later the pattern repeats."""
     steps: int = 96
     """Steps of the automaton from nothing to the texture."""
     steps_per_frame: int | None = None
@@ -75,19 +75,42 @@ class BlockConfig:
 
     def __post_init__(self) -> None:
         Compute(self.backend)
-        if not SMALLEST <= self.block <= LARGEST:
-            raise OptionError(f"--block {self.block}: must be from {SMALLEST} to {LARGEST} cells")
         if self.steps < 1:
             raise OptionError(f"--steps {self.steps}: at least 1 is needed")
         if self.steps_per_frame is not None and self.steps_per_frame < 0:
             raise OptionError(f"--steps-per-frame {self.steps_per_frame}: must not be negative")
 
 
+@dataclass(frozen=True)
+class BlockConfig(GrowthConfig):
+    """The block that is grown."""
+
+    block: int = 128
+    """Cells along an edge of the block; the larger, the later the pattern repeats."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not SMALLEST <= self.block <= LARGEST:
+            raise OptionError(f"--block {self.block}: must be from {SMALLEST} to {LARGEST} cells")
+
+
 def texture_rule(path: Path, style: str | None = None) -> Rule:
-    """The rule of a model, in a style of several; says so if it was not trained as a texture.
+    """The rule of a solid texture.
 
     Raises:
-        VncaError: If the model cannot be read, or has no such style.
+        VncaError: If the model cannot be read, is of a flat texture, or has no such style.
+    """
+    model = texture_model(path, style)
+    if model.training.get("dimensions") == 2:
+        raise OptionError(f"{path}: is a flat texture, to be filmed (vnca texture film)")
+    return model.rule
+
+
+def texture_model(path: Path, style: str | None = None) -> Model:
+    """A model, in a style of several; says so if it was not trained as a texture.
+
+    Raises:
+        VncaError: If it cannot be read, or has no such style.
     """
     model = Model.load(path)
     number = 0 if style is None else style_number(model, style, "style")
@@ -97,7 +120,7 @@ def texture_rule(path: Path, style: str | None = None) -> Rule:
     model = alone(model, number)
     if model.training.get("kind") != KIND:
         say(f"{path}: was trained on smoke, not as a texture (vnca texture train)")
-    return model.rule
+    return model
 
 
 def grown_blocks(rule: Rule, config: BlockConfig, count: int = 1) -> Iterator[Block]:
