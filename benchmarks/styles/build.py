@@ -15,6 +15,10 @@ The first was made before rules were carried (`--no-transport --steadiness 0 --m
 does that now). The café went on for 120 iterations at a steadiness of 2 and for 120 at 1, as 300 at
 0.5 left it pale; the threads for another 100 with `--overflow 400`. States live for 640 steps: as
 long as films are.
+
+The engraving began with the woodcut: 100 of the 300 iterations on its texture that `--graft woodcut
+--texture 3 --iterations 100` asks for, then, by `--init` of that, 50 of 80 on the smoke.
+
 What a model tells of the smoke that it was trained on is left out: the library paints
 other smoke.
 """
@@ -42,6 +46,7 @@ TITLES = {
     "harvest": "Vincent van Gogh, The Harvest (1888)",
     "circuit": "copper traces on a green board",
     "embers": "glowing cracks in a black crust",
+    "engraving": "lines of ink on paper that swell and end",
     "frost": "pale feathers of ice on deep blue",
     "fur": "tawny strands",
     "ink": "black and sepia ink in water",
@@ -67,7 +72,7 @@ def main(smoke: Path, out: Path, runs: dict[str, Path]) -> None:
 
 def packed(model: Model, name: str) -> Model:
     """The model with nothing in it of the smoke that it was trained on but its place in none."""
-    kept = ("style", "preset", "iterations", "seed", "features", "picture_cells")
+    kept = ("style", "preset", "iterations", "seed", "features", "picture_cells", "origins")
     training = {"title": TITLES[name]} | {k: v for k, v in model.training.items() if k in kept}
     return Model(dataclasses.replace(model.rule, place=None), training, model.style)
 

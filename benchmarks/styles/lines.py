@@ -11,7 +11,9 @@ from fields import (
     currents,
     mix,
     noise,
+    places,
     ramp,
+    smooth,
 )
 from numpy.random import Generator
 from strokes import Sheet, path
@@ -38,10 +40,28 @@ def threads(rng: Generator, n: int) -> Field:
     return sheet.read()
 
 
+def engraving(rng: Generator, n: int) -> Field:
+    """Level lines of ink on paper, which wave, swell and end."""
+    rows = 24
+    x, y = places(n)
+    down = rows * (y + 0.011 * noise(rng, n, 0.25) + 0.001 * noise(rng, n, 0.06))
+    row = np.floor(down)
+    tone = 0.44 + 0.13 * noise(rng, n, 0.16)
+    # Each line swells by itself: its neighbours take it from far away.
+    hand = at(noise(rng, n, 0.09), x, 7 * row / rows)
+    width = tone + 0.11 * hand
+    grain = 0.05 * noise(rng, n, 0.004)
+    away = np.abs(down - row - 0.5)
+    ink = smooth(width / 2 - away, -0.04, 0.04) * smooth(width, 0.1, 0.2)
+    paper = ramp(0.5 + 0.2 * noise(rng, n, 0.1, 0.8), ["dcd2bd", "ece4d2", "f6f1e4"])
+    dark = ramp(0.5 + 0.25 * noise(rng, n, 0.12), ["0d1726", "1c2433", "33262a"])
+    return mix(paper, dark, np.clip(ink * (0.97 + np.minimum(grain, 0)), 0, 1))
+
+
 def fur(rng: Generator, n: int) -> Field:
     """Tawny hair in locks, striped."""
     m = n // 2
-    angle = 1.2 + 0.55 * noise(rng, m, 0.22)
+    angle = 1.5 + 0.22 * noise(rng, m, 0.22)
     stripes = np.sin(9 * noise(rng, m, 0.5) + 1.2 * noise(rng, m, 0.12))
     u, v = np.cos(angle), np.sin(angle)
     coat = ["160d0a", "4a2713", "9a5420", "d0873a", "ecbf77", "fbeccb"]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from fields import Field
-from lines import circuit, frost, fur, threads
+from lines import circuit, engraving, frost, fur, threads
 from numpy.random import Generator
 from PIL import Image
 from surfaces import embers, ink, marble, mosaic, rust, stained_glass, watercolour, woodcut
@@ -27,6 +27,7 @@ PICTURES: dict[str, Callable[[Generator, int], Field]] = {
     "watercolour": watercolour,
     "mosaic": mosaic,
     "fur": fur,
+    "engraving": engraving,
     "rust": rust,
     "frost": frost,
     "circuit": circuit,

@@ -1,6 +1,7 @@
 """Along what strokes are told to run, and what painting makes of it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,9 @@ from vnca.core.volume import Volume
 from vnca.direction import Direction, Inputs, Moment
 from vnca.direction.grammar import parsed_guide
 from vnca.direction.guides import inwards, steering
+from vnca.direction.guides.picture import strokes_stand
 from vnca.engine.automaton import Automaton, Weights, stencil
+from vnca.rule.model import Model
 
 MODEL = Path(__file__).parents[1] / "data" / "painting" / "rule.safetensors"
 CELLS = np.stack(np.meshgrid(*[np.arange(4, 8)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -150,11 +153,34 @@ def test_steering_turns_the_frame_of_the_picture_to_direction_and_surface() -> N
     turned = np.einsum("nij,nj->ni", found[:50], inward[:50])
     assert (turned[:, 1] > 0).mean() > 0.9
     assert np.abs(turned[:, 2]).max() < 0.1
+    # Strokes that stand are laid along it too, and depth stays depth.
+    upright = steering(along, inward, 1.0, len(along), standing=True).astype(np.float64)
+    quarter = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
+    is_guided = along.any(axis=1)
+    np.testing.assert_allclose(upright[is_guided], quarter @ found[is_guided], atol=1e-5)
+    np.testing.assert_allclose(upright[~is_guided], eyes[~is_guided], atol=1e-6)
     np.testing.assert_allclose(steering(along, inward, 2.0, len(along)), 2 * found, atol=1e-4)
     halves = np.linspace(0.5, 1, len(along))
     np.testing.assert_allclose(
         steering(None, None, halves, len(along)), halves[:, None, None] * eyes, atol=1e-6
     )
+
+
+def striped(*, across: bool, tilt: float = 0.0) -> AnyArray:
+    """A picture of strokes, two pixels wide, that lie `across` it or stand."""
+    down, right = np.indices((48, 60)) / 4.0
+    waves = np.sin(2 * np.pi * ((down if across else right) + tilt * (down + right)))
+    return np.repeat(0.5 + 0.4 * waves[..., None], 3, -1).astype(np.float32)
+
+
+def test_strokes_of_a_picture_stand_or_lie() -> None:
+    lying, standing = striped(across=True, tilt=0.1), striped(across=False, tilt=0.1)
+    assert strokes_stand([standing])
+    assert not strokes_stand([lying])
+    assert not strokes_stand([lying, standing])
+    assert not strokes_stand([])
+    assert not strokes_stand([np.random.default_rng(0).random((48, 60, 3), np.float32)])
+    assert not strokes_stand([np.full((1, 1, 3), 0.5, np.float32)])
 
 
 def test_inwards_is_where_density_grows() -> None:
@@ -226,6 +252,22 @@ def test_a_grid_of_vectors_guides(painted: Painted, add_vectors: Callable[..., N
     assert_same(painted(guide="1:z"), painted(guide="@along"))
     add_vectors("across", (3, 0, 0))
     assert_same(painted(guide="x"), painted(guide="@across"))
+
+
+def test_a_guide_lays_the_strokes_of_the_picture_along_itself(smoke: Path) -> None:
+    """Strokes that stand need the guide turned by a quarter; without a guide they are let be."""
+    lying, standing = (
+        replace(Model.load(MODEL), style=(255 * striped(across=across)).astype(np.uint8))
+        for across in (True, False)
+    )
+
+    def painting(model: Model, guide: str | None = None) -> list[AnyArray]:
+        return [np.asarray(frame.colour) for frame in vnca.stylize(model, smoke, guide=guide)]
+
+    for one, other in zip(painting(lying), painting(standing), strict=True):
+        np.testing.assert_array_equal(one, other)
+    guided = zip(painting(lying, guide="x"), painting(standing, guide="x"), strict=True)
+    assert all(np.abs(one - other).max() > 1e-4 for one, other in guided)
 
 
 def test_a_guide_that_frames_lack_is_told_before_the_first(

@@ -153,7 +153,7 @@ class Direction:
         """Whether the pattern may be turned or another size anywhere."""
         return self.guided is not None or self.values["pattern_size"] != Constant(1.0)
 
-    def steering(self, moment: Moment, cells: AnyArray) -> FloatArray | None:
+    def steering(self, moment: Moment, cells: AnyArray, standing: bool) -> FloatArray | None:
         """By what cells `[n, 3]` are steered, see `guides.steering`; None if they are not.
 
         Raises:
@@ -165,7 +165,7 @@ class Direction:
         if self.guided is None:
             return steering(None, None, size, len(cells))
         directions = unit(np.asarray(self.guided.at(moment, cells)))
-        return steering(directions, inwards(moment, cells), size, len(cells))
+        return steering(directions, inwards(moment, cells), size, len(cells), standing)
 
     @property
     def substeps(self) -> int:

@@ -71,6 +71,7 @@ class Roll:
         blend: The rules whose weights are mixed with its own, in the order of `config.blend`.
         inputs: What the direction of `config` takes beside the smoke.
         editing: What it does with colours as a whole.
+        standing: Whether strokes of the style's picture are upright; guides turn them so.
     """
 
     rule: Rule
@@ -85,6 +86,7 @@ class Roll:
     blend: tuple[Rule, ...] = ()
     inputs: Inputs = field(default_factory=Inputs)
     editing: Editing = field(default_factory=Editing)
+    standing: bool = False
 
     @property
     def steps_per_frame(self) -> int | str:
@@ -242,9 +244,8 @@ class Roll:
             return RollState.empty(self.rule.config.channels, state.steps_done)
         if self.styles:
             session = session.conditioned(self.told(ready, moment))
-        steering = self.config.steering(moment, domain.cells)
-        if steering is not None:
-            session = session.steered(steering)
+        steering = self.config.steering(moment, domain.cells, self.standing)
+        session = session if steering is None else session.steered(steering)
         warmup = self.config.warmup if len(state.cells) == 0 else 0
         warmup *= self.config.substeps
         done = state.steps_done + warmup

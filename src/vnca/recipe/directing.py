@@ -15,6 +15,7 @@ from vnca.core.errors import OptionError
 from vnca.core.files import existing_file
 from vnca.direction import Direction, Inputs
 from vnca.direction.colour import Editing
+from vnca.direction.guides.picture import strokes_stand
 from vnca.direction.values import Constant
 from vnca.io import SmokeFormat
 from vnca.io.sequence import FrameSequence
@@ -64,14 +65,25 @@ def directed(
     if sequence is not None:
         direction.require(inputs)
     styles = tuple(style_number(model, n, "style_mix") for n in direction.mixed_names("style_mix"))
-    picture = _picture(model, direction, styles)
+    pictures = _pictures(model, direction, styles)
+    picture = _together(pictures, direction)
     editing = Editing.asked(direction.recolour, direction.match, picture)
     # Layers are told what the first is told, and draw no layers of their own.
     alone = replace(direction, layers=(), style_mix=(), blend=())
     blend = tuple(_blended(name, model) for name in direction.mixed_names("blend"))
-    rules = [_layer(name, roll.rule, refine) for name in direction.layer_names]
-    layers = tuple(replace(roll, rule=rule, config=alone, inputs=inputs) for rule in rules)
-    roll = replace(roll, styles=styles, blend=blend)
+    above = [_layer(name, roll.rule, refine) for name in direction.layer_names]
+    rules = [each.rule for each in above]
+    layers = tuple(
+        replace(
+            roll,
+            rule=each.rule,
+            config=alone,
+            inputs=inputs,
+            standing=strokes_stand(_linear(each)[:1]),
+        )
+        for each in above
+    )
+    roll = replace(roll, styles=styles, blend=blend, standing=strokes_stand(pictures))
     made = replace(roll, layers=layers, inputs=inputs, editing=editing).refined(refine)
     conditions: dict[str, Any] = {}
     if rules:
@@ -92,15 +104,24 @@ def say_styles(model: Model, direction: Direction, watch: Watch) -> None:
         watch.note(f"painting in the first of the styles {listed}; `style_mix` asks for others")
 
 
-def _picture(model: Model, direction: Direction, styles: Sequence[int]) -> FloatArray | None:
-    """The picture whose colours are those of the painting, linear RGB; of several, their pixels.
+def _pictures(model: Model, direction: Direction, styles: Sequence[int]) -> list[FloatArray]:
+    """The pictures of the styles that are painted, linear RGB."""
+    shown, whole = [0, *styles], direction.mixes["style_mix"] == (Constant(1.0),)
+    known = dict(enumerate(_linear(model)))
+    return [known[n] for n in sorted(set(shown[whole:])) if n in known]
+
+
+def _linear(model: Model) -> list[FloatArray]:
+    """The pictures of all styles of a model, linear RGB."""
+    return [srgb_to_linear(each / np.float32(255)) for each in model.thumbnails]
+
+
+def _together(pictures: Sequence[FloatArray], direction: Direction) -> FloatArray | None:
+    """A picture whose colours are those of the painting; of several, their pixels.
 
     Raises:
         OptionError: If a colour is asked for by its number, and there are several pictures.
     """
-    shown, whole = [0, *styles], direction.mixes["style_mix"] == (Constant(1.0),)
-    thumbnails = dict(enumerate(model.thumbnails))
-    pictures = [thumbnails[n] for n in sorted(set(shown[whole:])) if n in thumbnails]
     numbered = [text for text in direction.recolour if not text.startswith("#")]
     if len(pictures) > 1 and numbered:
         raise OptionError(
@@ -108,8 +129,8 @@ def _picture(model: Model, direction: Direction, styles: Sequence[int]) -> Float
             "the old colour itself, as #1b2a49"
         )
     if len(pictures) > 1:
-        pictures = [np.concatenate([each.reshape(-1, 1, 3) for each in pictures])]
-    return srgb_to_linear(pictures[0] / np.float32(255)) if pictures else None
+        return np.concatenate([each.reshape(-1, 1, 3) for each in pictures])
+    return pictures[0] if pictures else None
 
 
 def _blended(name: str, first: Model) -> Rule:
@@ -134,8 +155,8 @@ def _model(name: str, option: str) -> Model:
     return load_style(name) if name in styles else Model.load(name)
 
 
-def _layer(name: str, first: Rule, refine: int) -> Rule:
-    """The rule of a layer; smoke is as dense for it as for the first.
+def _layer(name: str, first: Rule, refine: int) -> Model:
+    """The model of a layer; smoke is as dense for its rule as for the first.
 
     Raises:
         OptionError: If there is no such style or model, or it cannot be laid over the first.
@@ -147,7 +168,7 @@ def _layer(name: str, first: Rule, refine: int) -> Rule:
             f"`layers` {name}: of it and the first rule only one has a decoder, so they run on "
             "different grids; choose `refine` 1"
         )
-    return model.rule.rescaled(density=first.scales.density)
+    return replace(model, rule=model.rule.rescaled(density=first.scales.density))
 
 
 def digest(rule: Rule) -> str:

@@ -26,37 +26,43 @@ _STEEP = 0.1
 
 
 def steering(
-    directions: AnyArray | None, inwards: AnyArray | None, size: Answer, count: int
+    directions: AnyArray | None,
+    inwards: AnyArray | None,
+    size: Answer,
+    count: int,
+    standing: bool = False,
 ) -> FloatArray:
     """What cells are steered by, `[n, 3, 3]`, so that strokes run along directions.
 
     A rule has a frame as its picture has: x to the right, y into the smoke, z up. It is turned so
-    that x lies along the direction and y as nearly inwards as that leaves it: a surface that the
-    direction runs along shows the picture turned, and nothing else. Where a direction goes straight
-    inwards, the rest is as the least rotation has it.
+    that x, or z where strokes stand, lies along the direction and y as nearly inwards as that
+    leaves it: a surface that the direction runs along shows the picture turned, and nothing else.
+    Where a direction goes straight inwards, the rest is as the least rotation has it.
 
     Args:
         directions: `[n, 3]`, one long; where zero, nothing is turned. None turns none.
         inwards: `[n, 3]` into the smoke, at most one long.
         size: How many times as large the pattern is to be.
         count: Of cells.
+        standing: Whether strokes of the picture are upright, see `picture.strokes_stand`.
     """
     turned = np.broadcast_to(np.eye(3), (count, 3, 3))
     if directions is not None and inwards is not None:
-        turned = _frames(directions.astype(np.float64), inwards.astype(np.float64))
+        turned = _frames(directions.astype(np.float64), inwards.astype(np.float64), standing)
     each = np.broadcast_to(np.float64(size), count)[:, None, None]
     return np.ascontiguousarray(each * turned, np.float32)
 
 
-def _frames(along: AnyArray, inwards: AnyArray) -> AnyArray:
-    """Rotations `[n, 3, 3]` that take `along` to x and as much as they can of `inwards` to y."""
+def _frames(along: AnyArray, inwards: AnyArray, standing: bool) -> AnyArray:
+    """Rotations `[n, 3, 3]` that take `along` to x, or z, and what they can of `inwards` to y."""
     # What the least rotation of x to `along` makes of y; of x turned round, y stays.
     x, y, _ = along.T
     first, other = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
     least = other - (y / np.maximum(1 + x, _NONE))[:, None] * (along + first)
     second = inwards - (inwards * along).sum(1, keepdims=True) * along + _BESIDE * least
     second /= np.maximum(np.linalg.norm(second, axis=1, keepdims=True), _NONE)
-    found = np.stack([along, second, np.cross(along, second)], axis=1)
+    third = np.cross(along, second)
+    found = np.stack([-third, second, along] if standing else [along, second, third], axis=1)
     found[~along.any(axis=1)] = np.eye(3)
     return found
 
