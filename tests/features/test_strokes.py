@@ -78,6 +78,12 @@ def test_strokes_span_three_cells_where_cells_are_seen_finely() -> None:
     assert 5 / SIZE * cells == pytest.approx(3, rel=0.15)
 
 
+def test_strokes_that_a_decoder_draws_span_two_cells_and_their_picture_fills_a_view() -> None:
+    cells = picture_cells(stripes(5), cells=32.0, pixels=128, drawn=True)
+    assert 5 / SIZE * cells == pytest.approx(2, rel=0.15)
+    assert picture_cells(stripes(24), cells=60.0, pixels=240, drawn=True) == 60
+
+
 @pytest.mark.parametrize("across", [64.0, 400.0])
 def test_strokes_span_four_pixels_where_they_are_not(across: float) -> None:
     cells = picture_cells(stripes(5), cells=across, pixels=64)

@@ -53,6 +53,7 @@ def iteration(scene: Any, before: torch.Tensor, after: torch.Tensor, age: int) -
     nothing = torch.zeros(())
     return Iteration(
         before=before,
+        kept=before,
         after=after,
         age=age,
         frames=1.0,
@@ -111,12 +112,35 @@ def test_smoke_carries_a_state_up_to_a_frame_along(scene: SmokeScene) -> None:
         def uniform(self) -> float:
             return 1.0
 
-    carried = scene.transported(state, Whole())  # type: ignore[arg-type]
+    carried, worn = scene.transported(state, Whole())  # type: ignore[arg-type]
     middle = (scene._density > 0.99) & (height > float(height.median()))
-    risen = (height - carried[:-1, 0])[middle]
-    # It rises by half a cell a frame.
-    np.testing.assert_allclose(risen.numpy(), 0.5, atol=0.02)
-    assert not carried[-1].any()
+    for moved in (carried, worn):
+        risen = (height - moved[:-1, 0])[middle]
+        # It rises by half a cell a frame.
+        np.testing.assert_allclose(risen.numpy(), 0.5, atol=0.05)
+        assert not moved[-1].any()
+
+
+def test_what_is_worn_has_lost_of_what_is_fine_and_not_of_what_is_broad() -> None:
+    scene = BlockScene(24, SliceConfig(size=32), conditioning_width=7)
+
+    def left(length: int) -> float:
+        wave = np.sin(2 * np.pi / length * scene.domain.cells[:, 0])
+        state = torch.zeros(len(scene.domain) + 1, 4)
+        state[:-1, 0] = torch.from_numpy(wave.astype(np.float32))
+        carried, worn = scene.transported(state, np.random.default_rng(0))
+        return float(worn.square().mean() / carried.square().mean())
+
+    assert left(3) < 0.95
+    assert left(12) > 0.99
+
+
+def test_a_cell_that_nothing_came_to_is_left_to_grow(scene: SmokeScene) -> None:
+    after = grown(scene)
+    kept = after.clone()
+    kept[: len(kept) // 2] = 0
+    seen = replace(iteration(scene, kept, after, GROWN), kept=kept)
+    assert float(SteadinessTerm(1)(seen)["steadiness"]) == 0
 
 
 def test_a_block_is_carried_as_a_whole() -> None:

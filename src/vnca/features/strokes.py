@@ -17,7 +17,9 @@ from vnca.core import AnyArray, BoolArray, FloatArray
 from vnca.core.colour import linear_to_srgb
 
 STROKE_CELLS = 3.0
-"""Cells that a stroke spans."""
+"""Cells that a stroke spans where cells are all that is seen."""
+DRAWN_STROKE_CELLS = 2.0
+"""Cells that it spans where a decoder draws what is finer than they are."""
 STROKE_PIXELS = 4.0
 """Pixels that it spans at least: the finer marks in it are a quarter as wide."""
 FINEST, COARSEST = 3 / 128, 3 / 48
@@ -126,22 +128,25 @@ def stroke_width(picture: FloatArray) -> float | None:
     return width / shorter if width > 0 else None
 
 
-def picture_cells(picture: FloatArray, cells: float, pixels: int) -> float:
+def picture_cells(picture: FloatArray, cells: float, pixels: int, *, drawn: bool = False) -> float:
     """Cells along the shorter side at which a picture is best shown.
 
-    Its strokes then span three cells, and four pixels at least. A flat picture has none to span
-    anything: it is shown once in a view.
+    Its strokes then span three cells, two where they are drawn, and four pixels at least.
+    A drawn picture fills a view, however large its strokes. A flat one has none to span anything:
+    it is shown once in a view.
 
     Args:
         picture: Linear RGB `[r, c, 3]`.
         cells: Those across a view of what is trained on.
         pixels: The same in pixels.
+        drawn: Whether a decoder draws what is finer than cells.
     """
     width = stroke_width(picture)
     if width is None:
         return cells
-    stroke = max(STROKE_CELLS, STROKE_PIXELS * cells / pixels)
-    return stroke / min(max(width, FINEST), COARSEST)
+    stroke = max(DRAWN_STROKE_CELLS if drawn else STROKE_CELLS, STROKE_PIXELS * cells / pixels)
+    wanted = stroke / min(max(width, FINEST), COARSEST)
+    return max(wanted, cells) if drawn else wanted
 
 
 def _reduced(picture: FloatArray, factor: float) -> FloatArray:

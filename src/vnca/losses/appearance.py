@@ -50,7 +50,8 @@ class AppearanceConfig:
     """Positions drawn in each layer for style matching, from either picture."""
     style_scale: float | None = None
     """Shorter side of the style image relative to the view: below 1 shrinks the brush strokes.
-    Chosen so that a stroke of the picture spans three cells, and four pixels, unless given."""
+    Chosen by the strokes of the picture unless given: they span three cells, two where a decoder
+    draws them, and four pixels at least."""
     opacity_threshold: float = 0.6
     """Compare only where the smoke is at least this opaque."""
 
@@ -129,6 +130,8 @@ class AppearanceLoss:
         config: AppearanceConfig,
         size: int,
         cells: float | None = None,
+        *,
+        drawn: bool = False,
     ) -> None:
         """Prepare the style image.
 
@@ -139,6 +142,7 @@ class AppearanceLoss:
             size: Shorter side of the views, pixels.
             cells: The same in cells, to choose the scale of the style image by; a cell a pixel
                 unless given.
+            drawn: Whether a decoder draws what is finer than cells.
 
         Raises:
             OptionError: If a layer does not exist.
@@ -148,7 +152,7 @@ class AppearanceLoss:
             raise ShapeError(f"style image: expected [r, c, 3], got {style_image.shape}")
         self.config = config
         self._network = network
-        self.style_scale = config.style_scale or style_scale(style_image, size, cells)
+        self.style_scale = config.style_scale or style_scale(style_image, size, cells, drawn=drawn)
         linear = torch.tensor(style_image, dtype=torch.float32, device=network.device)
         linear = linear.permute(2, 0, 1)[None]
         self.background = linear.mean((0, 2, 3))
@@ -270,16 +274,19 @@ class AppearanceLoss:
                 yield _rows(features, where)
 
 
-def style_scale(style_image: FloatArray, size: int, cells: float | None = None) -> float:
+def style_scale(
+    style_image: FloatArray, size: int, cells: float | None = None, *, drawn: bool = False
+) -> float:
     """Shorter side of a style image relative to views, for its strokes to span some cells.
 
     Args:
         style_image: Linear RGB `[r, c, 3]`.
         size: Shorter side of the views, pixels.
         cells: The same in cells; a cell a pixel unless given.
+        drawn: Whether a decoder draws what is finer than cells.
     """
     cells = float(size) if cells is None else cells
-    return picture_cells(style_image, cells, size) / cells
+    return picture_cells(style_image, cells, size, drawn=drawn) / cells
 
 
 def _rows(features: Float[Tensor, "n c"], where: Int[Tensor, " m"]) -> Float[Tensor, "m c"]:

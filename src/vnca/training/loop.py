@@ -122,7 +122,14 @@ class Trainer:
             differentiable=True,
         )
         self.appearances = tuple(
-            AppearanceLoss(network, picture, config.appearance, config.pictures.size, scene.width)
+            AppearanceLoss(
+                network,
+                picture,
+                config.appearance,
+                config.pictures.size,
+                scene.width,
+                drawn=scene.decoder is not None,
+            )
             for picture in ([style] if isinstance(style, np.ndarray) else style)
         )
         self._columns, self._lessons = rule.config.style_columns, None
@@ -265,10 +272,11 @@ class Trainer:
     def _improve(self) -> Progress:
         config = self.config
         slot, life, age, before = self._pool.draw(self.iteration)
+        kept = before
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
         scene = self.scene.augmented(life)
         if config.rule.transport and age:
-            before = scene.transported(before, self._random)
+            kept, before = scene.transported(before, self._random)
         judged = WHOLE
         mix = self._lessons and self._lessons.of(life, age)
         if mix is not None and self._columns is not None:
@@ -283,6 +291,7 @@ class Trainer:
         sums: dict[str, Tensor] = {}
         seen = Iteration(
             before=before,
+            kept=kept,
             after=state,
             age=age,
             frames=steps / config.rule.steps_per_frame,
@@ -301,15 +310,15 @@ class Trainer:
                 sums[term.name] = torch.stack([*found.values()]).sum()
         first, *others = sums.values()
         loss = first + torch.stack(others).sum()
-        kept = self._pool.put(slot, state)
+        is_sound = self._pool.put(slot, state)
         rate = config.rate(self.iteration)
         self.iteration += 1
-        went_on = self._descent.step(loss, rate, self.iteration, exploded=not kept)
+        went_on = self._descent.step(loss, rate, self.iteration, exploded=not is_sound)
         return Progress(
             iteration=self.iteration,
             loss=float(loss.detach()),
             terms={name: float(value.detach()) for name, value in terms.items()},
-            exploded=not kept,
+            exploded=not is_sound,
             diverged=not went_on,
         )
 

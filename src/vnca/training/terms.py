@@ -43,6 +43,7 @@ class Iteration:
 
     Attributes:
         before: The state at the start of the rollout, `[n + 1, C]`.
+        kept: What is to be kept of it: as it was before carrying wore it, alike.
         after: The state at its end, alike; differentiable.
         age: Rollouts that the state had been through before, in what styles are asked for now.
         frames: Frames that pass in the rollout: its steps over those of a frame.
@@ -57,6 +58,7 @@ class Iteration:
     """
 
     before: Tensor
+    kept: Tensor
     after: Tensor
     age: int
     frames: float
@@ -186,9 +188,11 @@ class SteadinessTerm(Term):
         balance = self._balance.after(float(seen.sums["appearance"].detach()))
         if seen.age < GROWN:
             return {}
-        before, after = seen.before[:-1], seen.after[:-1]
-        variance = (before - before.mean(0)).square().mean().clamp_min(_LEAST_VARIANCE)
-        change = (after - before).square().mean() / variance
+        kept, after = seen.kept[:-1], seen.after[:-1]
+        variance = (kept - kept.mean(0)).square().mean().clamp_min(_LEAST_VARIANCE)
+        # Cells that nothing was carried to are left to grow.
+        grown = kept.any(1, keepdim=True)
+        change = ((after - kept) * grown).square().mean() / variance
         return {"steadiness": self._weight * balance * change}
 
     def snapshot(self) -> Snapshot:

@@ -130,12 +130,17 @@ class Scene(ABC, Generic[Viewpoint]):
             viewpoint: Where to look from.
         """
 
-    def transported(self, state: Tensor, random: np.random.Generator) -> Tensor:
-        """A state carried along for a random part of a frame; no gradient flows through it.
+    def transported(self, state: Tensor, random: np.random.Generator) -> tuple[Tensor, Tensor]:
+        """A state carried along for a random part of a frame, and worn by being carried.
 
-        So a rule meets what painting makes of its states between frames.
+        So a rule meets what painting makes of its states between frames. The second has been
+        carried back and forth once more: as each time takes some of what is fine, a rule that
+        makes the first of the second learns to give back what carrying takes. No gradient flows
+        through either.
         """
-        return self._carried(state, random.uniform() * self.drift(random))
+        moved = random.uniform() * self.drift(random)
+        carried = self._carried(state, moved)
+        return carried, self._carried(self._carried(carried, -moved), moved)
 
     @abstractmethod
     def drift(self, random: np.random.Generator) -> FloatArray:
