@@ -5,19 +5,16 @@ python benchmarks/styles/build.py SMOKE OUT NAME=RUN ...
 SMOKE is a frame that thumbnails are painted on, OUT the folder of the library, RUN the folder of a
 training: of a picture here, drawn by pictures.py, or in the package, each with
 
-    vnca train FRAME PICTURE --graft none --texture 4 --iterations 200 --pool.reseed-every 40 -s 1
+    vnca train FRAME PICTURE --graft STYLE --texture 2 --iterations 125 --pool.reseed-every 40 -s 1
 
-and then, gone on with as a pattern that the smoke carries,
-
-    vnca train FRAME PICTURE --init RUN --iterations 300 --pool.reseed-every 40 -s 1
-
-The first was made before rules were carried (`--no-transport --steadiness 0 --motion.weight 0.3`
-does that now). The café went on for 120 iterations at a steadiness of 2 and for 120 at 1, as 300 at
-0.5 left it pale; the threads for another 100 with `--overflow 400`. States live for 640 steps: as
-long as films are.
-
-The engraving began with the woodcut: 100 of the 300 iterations on its texture that `--graft woodcut
---texture 3 --iterations 100` asks for, then, by `--init` of that, 50 of 80 on the smoke.
+STYLE is that of the same name, as it was before: trained with strokes of three cells, from nothing
+(`--graft none --texture 4 --iterations 200`), then gone on with for 300 iterations as a pattern that
+the smoke carries. The woodcut and the threads began with textures from nothing, of 600 iterations at
+`--appearance.style-scale 2`: the woodcut went on at that for 150 iterations on smoke (`--init`), the
+threads for 400 on a texture and 200 on smoke as above. The engraving began with the woodcut before:
+100 of the 300 iterations on its texture that `--graft woodcut --texture 3 --iterations 100` asks
+for, then, by `--init` of that, 50 of 80 on the smoke. States live for 640 steps: as long as films
+are.
 
 What a model tells of the smoke that it was trained on is left out: the library paints
 other smoke.
