@@ -27,7 +27,7 @@ gallery: setup
 	$(BIN)/python docs/gallery/textures.py build/gallery
 	$(BIN)/python docs/gallery/smoke.py build/gallery
 
-# The paper's tables, from nothing: a night on two cores. It goes on where it was interrupted.
+# The paper's tables, from nothing, in hours. It goes on where it was interrupted.
 # FULL=--full takes the paper's sizes, for a GPU; FULL=--smallest tries it out in minutes.
 paper: setup
 	$(BIN)/python benchmarks/paper/night.py --out build/paper $(FULL)

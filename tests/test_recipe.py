@@ -52,6 +52,16 @@ def cache(tiny_smoke: Volume, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def longer_cache(tiny_smoke: Volume, cache: Path) -> Path:
+    """Two frames more."""
+    x, y, z = tiny_smoke.origin
+    for number in (3, 4):
+        moved = replace(tiny_smoke, origin=(x, y, z + number), frame=number)
+        vnca.write_smoke(str(cache / f"ball_{number:04d}.vdb"), moved)
+    return cache
+
+
+@pytest.fixture
 def model(tmp_path: Path) -> Path:
     """The folder of a run whose model was made up."""
     config = vnca.RuleConfig(channels=6, hidden=8, position_prior=False)
@@ -157,11 +167,15 @@ def test_a_training_is_cancelled_and_resumed(cache: Path, picture: Path, tmp_pat
     assert not (run / CHECKPOINT_NAME).exists()
 
 
-def test_a_painting_is_cancelled_and_resumed(cache: Path, model: Path, tmp_path: Path) -> None:
+def test_a_painting_is_cancelled_and_resumed(
+    longer_cache: Path, model: Path, tmp_path: Path
+) -> None:
+    """The frame that is being written as it is cancelled is finished."""
+    cache, watch = longer_cache, Listener(until=1)
     whole = [f.path for f in vnca.stylize(model, cache, out=tmp_path / "whole", warmup=2)]
     with pytest.raises(vnca.Cancelled):
-        list(vnca.stylize(model, cache, out=tmp_path / "out", warmup=2, watch=Listener(until=1)))
-    assert len([*(tmp_path / "out").glob("*.vdb")]) == 1
+        list(vnca.stylize(model, cache, out=tmp_path / "out", warmup=2, watch=watch))
+    assert len([*(tmp_path / "out").glob("*.vdb")]) == 2
     resumed = vnca.stylize(model, cache, out=tmp_path / "out", warmup=2, resume=True)
     for one, other in zip(whole, [f.path for f in resumed], strict=True):
         assert one is not None
@@ -169,14 +183,15 @@ def test_a_painting_is_cancelled_and_resumed(cache: Path, model: Path, tmp_path:
         assert one.read_bytes() == other.read_bytes()
 
 
-def test_who_stops_asking_can_resume_too(cache: Path, model: Path, tmp_path: Path) -> None:
+def test_who_stops_asking_can_resume_too(longer_cache: Path, model: Path, tmp_path: Path) -> None:
+    cache = longer_cache
     painting = vnca.stylize(model, cache, out=tmp_path / "out", warmup=2)
     first = next(painting)
     assert first.number == 1
     painting.close()  # type: ignore[attr-defined]
     listener = Listener()
     list(vnca.stylize(model, cache, out=tmp_path / "out", warmup=2, resume=True, watch=listener))
-    assert listener.told == [("painting", 1, 2), ("painting", 2, 2)]
+    assert listener.told == [("painting", done, 4) for done in (2, 3, 4)]
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ const PICTURES = {
 if (!existsSync(join(SITE, "index.html"))) {
   const vnca = (...given) => execFileSync(VNCA, given, { stdio: "inherit" });
   vnca("simulate", "plume", "--resolution", "44", "--frames", String(LAST + 1), "--out", SMOKE);
-  vnca("view", "stained_glass", SMOKE, "--export", SITE);
+  vnca("view", "cafe", SMOKE, "--export", SITE);
 }
 const asked = process.argv.slice(2);
 const [browser, server] = [await launch(), await serve(SITE)];

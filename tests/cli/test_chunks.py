@@ -149,7 +149,7 @@ def test_a_chunk_goes_on_after_an_end(chunks: Chunks, monkeypatch: pytest.Monkey
     """Also one that ended in its pre-roll; what it hands over is the same, too."""
     asked = ("--chunk", "2-3", "--preroll", 1)
     assert chunks.run("whole", *asked, "--state-out", chunks.state("whole")).code == 0
-    ends, names = iter((1, 2, 3)), ("passed", "paint")
+    ends, names = iter((1, 2, 3)), ("passed", "stepped")
 
     def ending(name: str) -> None:
         do = getattr(Roll, name)

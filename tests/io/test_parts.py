@@ -44,7 +44,7 @@ def require_alike(path: Path, format: SmokeFormat, boxes: list[Box]) -> None:
             inside = whole.density_field.dense(box).any()
             assert parts.holds(box) or not inside
             assert len(part.density_field.bricks) <= len(whole.density_field.bricks)
-        parts.require()
+        parts.require(parts.seen)
 
 
 def test_parts_of_blenders_smoke_are_those_of_the_whole() -> None:
@@ -122,7 +122,7 @@ def test_density_below_zero_is_refused_once_all_of_it_was_read(tmp_path: Path) -
         for x in (0, 8):
             parts.part(Box((x, 0, 0), (x + 8, 8, 8)))
         with pytest.raises(GridError, match=r"density goes from -0\.5 to 1"):
-            parts.require()
+            parts.require(parts.seen)
 
 
 def test_headers_tell_how_much_smoke_there_is(tmp_path: Path, tiny_smoke: Volume) -> None:

@@ -170,7 +170,7 @@ def test_a_rule_learns_to_keep_its_pattern(trainer: Callable[..., Trainer]) -> N
         list(training.run())
         return float(np.median(seen[-8:]))
 
-    assert changes(steadiness=4.0) < 0.5 * changes()
+    assert changes(steadiness=16.0) < 0.7 * changes()
 
 
 def test_all_of_it_goes_on_from_a_snapshot(trainer: Callable[..., Trainer]) -> None:

@@ -9,7 +9,7 @@ Reference: VNCA section 3.4, "For inference, we apply N update steps …".
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -59,13 +59,11 @@ class Roll:
     Attributes:
         rule: The trained rule.
         config: How it is applied.
-        box: Holds the smoke of all frames, in cells of the lattice that they share. Known from the
-            files' headers before the first frame is read.
+        box: Holds the smoke of all frames, in cells of their lattice; known from headers alone.
         compute: How steps are computed.
         colour_dilation: How many cells beyond the active ones their colour goes on.
         grid: How many times as fine as the grid of the smoke the automaton's is.
-        finer: How many times as fine as the automaton's the grid of the painting is; what is there
-            between the cells, the decoder says.
+        finer: How many times as fine as the automaton's that of the painting, which it decodes.
         layers: The rules of further layers, in the order of `config.layers`.
         styles: Which of the rule's styles each value of `config.style_mix` is of.
         blend: The rules whose weights are mixed with its own, in the order of `config.blend`.
@@ -160,15 +158,14 @@ class Roll:
             smoke: On a grid as fine as the automaton's; or what `ready` made of it.
             state: What the frame before it left.
         """
-        return self.stepped(smoke, state)[1]()
+        _, show = self.stepped(smoke, state)
+        del smoke  # what follows makes arrays of the same order
+        return show()
 
     def stepped(
         self, smoke: Volume | Ready, state: RollState
     ) -> tuple[RollState, Callable[[], Painting]]:
-        """What a frame leaves to the next; and what makes its painting, at any time, in any thread.
-
-        Arguments are those of `paint`.
-        """
+        """What a frame leaves to the next; and what makes its painting, once, in any thread."""
         ready = smoke if isinstance(smoke, Ready) else self.ready(smoke)
         moment = self.moment(ready.smoke, state.carried)
         rolls, each, states = (self, *self.layers), (ready, *ready.layers), (state, *state.layers)
@@ -177,8 +174,13 @@ class Roll:
         state = replace(left, layers=tuple(layers), carried=moment.carried)
         # To show a state takes as much memory again as a session holds.
         shown = [on._replace(session=None, conditioning=None, layers=()) for on in each]
-        seen = partial(self.seen, shown, (left, *layers), moment)
-        return state, lambda: self.painting(moment, seen(), state)
+
+        def show() -> Painting:
+            parts = self.seen(shown, (left, *layers), moment)
+            shown.clear()
+            return self.painting(moment, parts, state)
+
+        return state, show
 
     def rule_of(self, smoke: Volume) -> Rule:
         """The rule with the weights of a frame."""
@@ -389,10 +391,8 @@ def stylize(
 ) -> Iterator[Painting]:
     """Paint a sequence frame by frame, reading one at a time.
 
-    All are painted on the lattice of the first that has smoke, in whose cells the box is.
-
-    See `Roll` for the other arguments; `refine` times as fine as the smoke's is the grid of the
-    paintings.
+    All are painted on the lattice of the first that has smoke, in whose cells the box is, `refine`
+    times as fine. See `Roll` for the other arguments.
 
     Raises:
         GridError: If its cells are not cubic, or a frame can have no place on them.
