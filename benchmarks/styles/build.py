@@ -11,10 +11,10 @@ STYLE is that of the same name, as it was before: trained with strokes of three 
 (`--graft none --texture 4 --iterations 200`), then gone on with for 300 iterations as a pattern
 that the smoke carries. The woodcut and the threads began with textures from nothing, of 600
 iterations at `--appearance.style-scale 2`: the woodcut went on at that for 150 iterations on smoke
-(`--init`), the threads for 400 on a texture and 200 on smoke as above. The engraving began with
-the woodcut before: 100 of the 300 iterations on its texture that `--graft woodcut --texture 3
---iterations 100` asks for, then, by `--init` of that, 50 of 80 on the smoke. States live for 640
-steps: as long as films are.
+(`--init`) and for 80 more with `--overflow 600 -s 2`, the threads for 400 on a texture and 200 on
+smoke as above. The engraving began with the woodcut before: 100 of the 300 iterations on its
+texture that `--graft woodcut --texture 3 --iterations 100` asks for, then, by `--init` of that, 50
+of 80 on the smoke. States live for 640 steps: as long as films are.
 
 What a model tells of the smoke that it was trained on is left out: the library paints
 other smoke.
