@@ -145,12 +145,15 @@ def assert_conforms(
         np.testing.assert_allclose(got[name] / scale, exact / scale, atol=atol, err_msg=name)
 
 
-def assert_close_to_bfloat16(got: dict[str, AnyArray], expected: dict[str, AnyArray]) -> None:
+def assert_close_to_bfloat16(
+    got: dict[str, AnyArray], expected: dict[str, AnyArray], *, steered: bool
+) -> None:
     """As exact as the README of the kernels says. Hidden units near zero turn on and off, and
     gradients with them."""
+    furthest = 7e-2 if steered else 6e-2
     for name, exact in expected.items():
         error = np.linalg.norm(got[name] - exact) / max(float(np.linalg.norm(exact)), 1e-30)
-        assert error <= (5e-3 if name == "state" else 7e-2), name
+        assert error <= (5e-3 if name == "state" else furthest), name
 
 
 CASES = {
@@ -188,8 +191,10 @@ def test_a_step_and_all_its_gradients_agree_with_the_reference(case: str, backen
         options = KERNELS[backend]
         gradients = zip(names, p.backward(**options), strict=True)
         got = {"state": p.forward(**options), **dict(gradients)}
-        short = options["precision"] == "bfloat16"
-        (assert_close_to_bfloat16 if short else assert_conforms)(got, exact)
+        if options["precision"] == "bfloat16":
+            assert_close_to_bfloat16(got, exact, steered=p.steering is not None)
+        else:
+            assert_conforms(got, exact)
 
 
 # Hundreds of hidden units take minutes on a software driver; and it does not steer.

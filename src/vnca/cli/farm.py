@@ -172,8 +172,9 @@ class Plan:
         if self.ranks is not None and self.tile is None:
             raise OptionError("`ranks`: share tiles; give `tile`, too")
         for name in ("machines", "chunk_size", "halo", "ranks"):
-            if (getattr(self, name) or 1) < 1 or getattr(self, name) == 0:
-                raise OptionError(f"`{name}` {getattr(self, name)}: at least 1 is needed")
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise OptionError(f"`{name}` {value}: at least 1 is needed")
         if self.preroll is not None and self.preroll < 0:
             raise OptionError(f"`preroll` {self.preroll}: must not be negative")
         if self.tile is not None and (self.tile < self.halo or self.tile < 1 or self.tile % 8):

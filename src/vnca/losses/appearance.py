@@ -16,6 +16,7 @@ from vnca.features import FeatureNetwork
 from vnca.features.strokes import picture_cells
 from vnca.losses import (
     Moments,
+    chosen_rows,
     luma,
     moment_distance,
     moments,
@@ -232,7 +233,9 @@ class AppearanceLoss:
 
     def _drawn(self, features: Tensor, generator: torch.Generator) -> Tensor:
         count, device = len(features), features.device
-        return _rows(features, sample_positions(count, self.config.samples, generator, device))
+        return chosen_rows(
+            features, sample_positions(count, self.config.samples, generator, device)
+        )
 
     def _features(self, picture: Tensor, grey: Tensor | None = None) -> list[list[Tensor]]:
         """Per layer, the maps of the picture in colour, in grey, or both."""
@@ -271,7 +274,7 @@ class AppearanceLoss:
         """The chosen vectors of every picture that has any."""
         for features, where in zip(_positions(maps), chosen, strict=True):
             if len(where):
-                yield _rows(features, where)
+                yield chosen_rows(features, where)
 
 
 def style_scale(
@@ -287,11 +290,6 @@ def style_scale(
     """
     cells = float(size) if cells is None else cells
     return picture_cells(style_image, cells, size, drawn=drawn) / cells
-
-
-def _rows(features: Float[Tensor, "n c"], where: Int[Tensor, " m"]) -> Float[Tensor, "m c"]:
-    """Some of the vectors; their gradient is added by rows, that of indexing number by number."""
-    return features.index_select(0, where)
 
 
 def _positions(maps: Float[Tensor, "b c r k"]) -> Float[Tensor, "b n c"]:

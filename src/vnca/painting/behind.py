@@ -52,7 +52,7 @@ def in_turn(jobs: Iterator[Callable[[], T]]) -> Generator[T, None, None]:
 
 
 @dataclass(eq=False)
-class Keeping:
+class Bookmark:
     """Keeps how far a painting has come in a file, now and then.
 
     Attributes:

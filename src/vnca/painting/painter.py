@@ -27,7 +27,7 @@ from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import up_axis_of
 from vnca.io.vdb import VdbFile
 from vnca.painting import Ready, Roll
-from vnca.painting.behind import Keeping, Writing, in_turn, one_behind
+from vnca.painting.behind import Bookmark, Writing, in_turn, one_behind
 from vnca.painting.chunk import WHOLE, Chunk
 from vnca.painting.finished import MARK, is_complete, require_unchanged
 from vnca.painting.frames import VelocityCheck, read_ahead
@@ -90,13 +90,13 @@ class Painter:
         return self.sequence[self.chunk.first : self.chunk.stop]
 
     @cached_property
-    def _keeping(self) -> Keeping:
-        return Keeping(self.unfinished_path, self._save, self.ranks)
+    def _bookmark(self) -> Bookmark:
+        return Bookmark(self.unfinished_path, self._save, self.ranks)
 
     @property
     def finished(self) -> int:
         """How many frames are finished, of those that are painted."""
-        last = self._keeping.last
+        last = self._bookmark.last
         return 0 if last is None else max(0, len(last.sources) - self.chunk.first)
 
     @property
@@ -170,7 +170,7 @@ class Painter:
         Raises:
             VncaError: If a file cannot be written, or a broken frame is to stop the painting.
         """
-        self._keeping.last = unfinished
+        self._bookmark.last = unfinished
         done = unfinished.sources[self.chunk.first :]
         jobs = self._jobs(unfinished)
         # What ranks tell each other has an order, which threads do not keep.
@@ -182,11 +182,11 @@ class Painter:
                 if frame in self.frames:
                     yield path
             if self.chunk.state_out is not None:
-                self._save(self._keeping.last, self.chunk.state_out)
+                self._save(self._bookmark.last, self.chunk.state_out)
         finally:
             paths.close()
             jobs.close()
-            self._keeping.end()
+            self._bookmark.end()
 
     def _jobs(
         self, unfinished: Unfinished
@@ -205,15 +205,13 @@ class Painter:
             for frame, read in zip(self.sequence[start:stop], reads, strict=True):
                 try:
                     left = Unfinished(self.conditions, tuple(sources), state)
-                    before, (held, state, source, write) = (
-                        held,
-                        self._finish(frame, read, held, left),
-                    )
+                    before = held
+                    held, state, source, write = self._finish(frame, read, held, left)
                     sources.append(source)
                     after = Unfinished(self.conditions, tuple(sources), state)
                     path = self.target(frame) if source else None
                     unwanted = None if held is read else read
-                    yield partial(self._keeping.written, (frame, path), write, unwanted, after)
+                    yield partial(self._bookmark.written, (frame, path), write, unwanted, after)
                 except BaseException:
                     if held is not read:
                         close(read)
