@@ -112,4 +112,6 @@ def _doubled(moment: Moment, guide: Value, shown: Volume, refine: int, view: Vie
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 5:
+        sys.exit(__doc__)
     main(*sys.argv[1:])
