@@ -36,6 +36,12 @@ def drawn(seed: int, *shape: int, scale: float = 0.2) -> FloatArray:
     return (scale * np.random.default_rng(seed).standard_normal(shape)).astype(np.float32)
 
 
+def decoder(channels: int, units: int) -> DecoderWeights:
+    """Layers that do not let rounding grow: each sine adds as many values as it has inputs."""
+    shapes = DecoderWeights.shapes(channels, units)
+    return DecoderWeights(*(drawn(2 + k, *s, scale=1.5 / s[-1] ** 0.5) for k, s in enumerate(shapes)))
+
+
 def automaton(channels: int, hidden: int, told: int, probability: float) -> Automaton:
     weights = Weights(
         drawn(1, hidden, 5 * channels + told), drawn(2, hidden), drawn(3, channels, hidden)
@@ -96,8 +102,7 @@ def test_what_is_seen_is_what_numpy_sees(channels: int, units: int, with_weights
     domain = Domain.from_mask(np.random.default_rng(0).random((4, 5, 6)) < 0.8, (0, 0, 0))
     state = drawn(1, len(domain) + 1, channels, scale=0.5)
     state[-1] = 0
-    shapes = DecoderWeights.shapes(channels, units)
-    layers = DecoderWeights(*(drawn(2 + k, *s, scale=1.5) for k, s in enumerate(shapes)))
+    layers = decoder(channels, units)
     weights = layers if with_weights else None
     cells = np.arange(0, len(domain), 3, dtype=np.int32)
     decoding = backend_named("wgsl").array_decode()
@@ -146,8 +151,7 @@ def test_what_is_bound_in_parts_is_the_same_to_the_bit(
     rule = automaton(12, 32, 7, 0.5)
     state, told = drawn(4, len(domain) + 1, 12), drawn(5, len(domain), 7)
     state[-1] = 0
-    shapes = DecoderWeights.shapes(12, 8)
-    layers = DecoderWeights(*(drawn(2 + k, *s, scale=1.5) for k, s in enumerate(shapes)))
+    layers = decoder(12, 8)
     cells = np.arange(len(domain), dtype=np.int32)
     rows, fractions = subdivided(cells, domain.neighbours, 2)
     decoding = backend_named("wgsl").array_decode()

@@ -15,7 +15,7 @@ from pathlib import Path
 import torch
 from jaxtyping import Float
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -91,7 +91,7 @@ class FlowNetwork(nn.Module):
         """
         state = {key: value.half().cpu().contiguous() for key, value in self.state_dict().items()}
         with whole_file(path) as temporary:
-            save_file(state, temporary, metadata={"format": _FORMAT})
+            temporary.write_bytes(save(state, metadata={"format": _FORMAT}))
 
     def forward(
         self, before: Float[Tensor, "b r c"], after: Float[Tensor, "b r c"]

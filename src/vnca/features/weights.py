@@ -19,7 +19,7 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 
 from vnca.core.errors import BackendUnavailableError, FileFormatError, OptionError, OutputError
@@ -136,7 +136,7 @@ def save_weights(weights: Weights, path: Path) -> None:
         "mean": json.dumps(weights.mean),
     }
     with whole_file(path) as temporary:
-        save_file(tensors, temporary, metadata=header)
+        temporary.write_bytes(save(tensors, metadata=header))
 
 
 def _edges() -> Weights:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 
 import vnca
@@ -72,10 +72,8 @@ class Checkpoint:
             "values": {part: snapshot.values for part, snapshot in self.training.items()},
         }
         with whole_file(path) as temporary:
-            try:
-                save_file(tensors, temporary, metadata={_METADATA: json.dumps(described)})
-            except SafetensorError as error:  # a full disk, for one
-                raise OutputError(f"{path}: cannot be written ({error})") from error
+            # `save_file` writes beside it under a name of its own, which stays if it is killed.
+            temporary.write_bytes(save(tensors, metadata={_METADATA: json.dumps(described)}))
 
     @classmethod
     def load(cls, path: Path) -> "Checkpoint":
