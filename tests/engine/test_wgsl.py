@@ -39,7 +39,10 @@ def drawn(seed: int, *shape: int, scale: float = 0.2) -> FloatArray:
 def decoder(channels: int, units: int) -> DecoderWeights:
     """Layers that do not let rounding grow: each sine adds as many values as it has inputs."""
     shapes = DecoderWeights.shapes(channels, units)
-    return DecoderWeights(*(drawn(2 + k, *s, scale=1.5 / s[-1] ** 0.5) for k, s in enumerate(shapes)))
+    scales = [1.5 / shape[-1] ** 0.5 for shape in shapes]
+    return DecoderWeights(
+        *(drawn(2 + k, *shapes[k], scale=scale) for k, scale in enumerate(scales))
+    )
 
 
 def automaton(channels: int, hidden: int, told: int, probability: float) -> Automaton:

@@ -20,7 +20,7 @@ from torch import Tensor
 
 import vnca
 from vnca.core import AnyArray, FloatArray
-from vnca.core.errors import FileFormatError, OptionError, OutputError
+from vnca.core.errors import FileFormatError, OptionError
 from vnca.core.files import existing_file, whole_file
 from vnca.features import FeatureNetwork
 from vnca.training import Snapshot
