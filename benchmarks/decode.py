@@ -20,8 +20,8 @@ from vnca.engine.automaton import DecoderWeights
 from vnca.engine.domain import Domain
 from vnca.rule import Decoder
 
-FACTOR = 4
-"""Parts along a cell, for `cells`."""
+PARTS, SAMPLES = 2, 2
+"""Parts along a cell, and points along each, for `parts`."""
 
 
 def along_rays(edge: int, points: int) -> AnyArray:
@@ -71,7 +71,9 @@ def main() -> None:
         return lambda: torch.autograd.grad(seen(), trained, gradient)
 
     works: dict[tuple[str, str], Callable[[], object]] = {}
-    chosen = np.arange(0, len(domain), max(1, len(domain) * FACTOR**3 // points), dtype=np.int32)
+    chosen = np.arange(
+        0, len(domain), max(1, len(domain) * (PARTS * SAMPLES) ** 3 // points), dtype=np.int32
+    )
     for name in ("reference", *options.backends.split(",")):
         if name != "numpy":
             seen = on_tensors(name)
@@ -81,8 +83,8 @@ def main() -> None:
             arrays = array_decode("reference" if name == "numpy" else name, threads=options.threads)
             if name == "numpy":
                 works[name, "forward"] = lambda a=arrays: a.decode(state, rows, fractions, weights)
-            works[name, "cells"] = lambda a=arrays: a.decode_cells(
-                state, chosen, domain.neighbours, FACTOR, weights
+            works[name, "parts"] = lambda a=arrays: a.decode_parts(
+                state, chosen, domain.neighbours, PARTS, SAMPLES, weights, 0.5
             )
 
     expected = torch.as_tensor(works["reference", "forward"]()).cpu()
@@ -96,7 +98,7 @@ def main() -> None:
     shape = f"{options.channels} channels, {options.units} units"
     print(f"{shape}, {points} points, {options.threads} threads, {device}")
     for (name, kind), seconds in times.items():
-        count = len(chosen) * FACTOR**3 if kind == "cells" else points
+        count = len(chosen) * (PARTS * SAMPLES) ** 3 if kind == "parts" else points
         cost = Spread.of([1e9 * s / count for s in seconds])
         base = times["reference", "both" if kind == "both" else "forward"]
         ratio = Spread.of([1e9 * s / points for s in base]).median / cost.median

@@ -9,7 +9,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from vnca.core import AnyArray, FloatArray, IntArray
+from vnca.core import AnyArray, Box, FloatArray, IntArray
+from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import ShapeError
 from vnca.engine import native
 from vnca.engine import native as native_step
@@ -239,21 +240,83 @@ def domain(occupancy: float = 0.6) -> Domain:
     return Domain.from_mask(np.random.default_rng(0).random((5, 6, 7)) < occupancy, (-3, 0, 5))
 
 
-@pytest.mark.parametrize("factor", range(1, 9))
+CUTS = [(1, 1), (1, 3), (1, 8), (2, 1), (2, 2), (3, 2), (4, 2), (5, 1), (6, 1), (7, 1), (8, 1)]
+"""Parts along a cell, and points along a part."""
+
+
+@pytest.mark.parametrize(("parts", "samples"), CUTS)
 @pytest.mark.parametrize("backend", ["reference", *KERNELS])
-def test_parts_of_cells_are_seen_as_at_their_centres(factor: int, backend: str) -> None:
+def test_parts_of_cells_show_the_means_of_their_points(
+    parts: int, samples: int, backend: str
+) -> None:
     cells = domain()
     p = problem(1, cells=len(cells))
     chosen = np.random.default_rng(1).permutation(len(cells))[:5].astype(np.int32)
-    arguments = (p.state, chosen, cells.neighbours, factor, p.weights)
+    arguments = (p.state, chosen, cells.neighbours, parts, samples, p.weights, 0.3)
     if backend == "reference":
-        got = array_reference.decode_cells(*arguments)
+        colour, change = array_reference.decode_parts(*arguments)
     else:
-        got = native.decode_cells(*arguments, instructions=backend, threads=2)
-    assert got.shape == (5, factor, factor, factor, 4)
-    rows, fractions = subdivided(chosen, cells.neighbours, factor)
-    expected = array_reference.decode(p.state, rows, fractions, p.weights).reshape(got.shape)
-    np.testing.assert_allclose(got, expected, atol=3e-6 * np.abs(expected).max())
+        colour, change = native.decode_parts(*arguments, instructions=backend, threads=2)
+    points = subdivided(chosen, cells.neighbours, parts * samples)
+    seen = array_reference.decode(p.state, *points, p.weights).astype(float)
+    seen = seen.reshape(5, *3 * (parts, samples), 4)
+    light = srgb_to_linear(np.clip(seen[..., :3] + 0.5, 0, 1)).mean((2, 4, 6))
+    assert ((light > 0.05) & (light < 0.95)).any()
+    assert (np.abs(seen[..., 3]) > 0.3).any()
+    np.testing.assert_allclose(colour, light, atol=3e-5)
+    np.testing.assert_allclose(change, np.clip(seen[..., 3], -0.3, 0.3).mean((2, 4, 6)), atol=3e-5)
+
+
+def shown(values: FloatArray, backend: str) -> tuple[FloatArray, FloatArray]:
+    """What cells show whose decoder adds nothing: the light of values `[n]`, and them as Δd."""
+    state = np.repeat(np.append(values, np.float32(0)).astype(np.float32)[:, None], 4, axis=1)
+    nothing = DecoderWeights(*(np.zeros(s, np.float32) for s in DecoderWeights.shapes(4, 1)))
+    cells = np.arange(len(values), dtype=np.int32)
+    arguments = (state, cells, np.tile(cells, (27, 1)), 1, 1, nothing, 0.5)
+    colour, change = native.decode_parts(*arguments, instructions=backend)
+    return colour[:, 0, 0, 0], change[:, 0, 0, 0]
+
+
+@needs_native
+@pytest.mark.parametrize("backend", KERNELS)
+def test_light_is_that_of_srgb_over_its_whole_range(backend: str) -> None:
+    values = np.append(np.linspace(-0.7, 0.7, 200_001), [0.04045 - 0.5]).astype(np.float32)
+    colour, change = shown(values, backend)
+    exact = srgb_to_linear(np.clip(values.astype(float) + 0.5, 0, 1))
+    # Half of the last place of values around ½ is what they have in all.
+    np.testing.assert_allclose(colour[:, 1], exact, rtol=2e-6, atol=2e-7)
+    np.testing.assert_array_equal(colour[:, 0], colour[:, 2])
+    assert colour.min() == 0
+    np.testing.assert_allclose(colour.max(), 1, rtol=4e-7)
+    np.testing.assert_array_equal(change, np.clip(values, -0.5, 0.5))
+
+
+@needs_native
+@pytest.mark.parametrize("backend", KERNELS)
+def test_what_is_no_number_stays_visible_in_its_cell(backend: str) -> None:
+    values = np.full(40, 0.1, np.float32)
+    values[[3, 17]] = np.nan
+    for shows in shown(values, backend):
+        wrong = np.isnan(shows).reshape(40, -1)
+        np.testing.assert_array_equal(np.flatnonzero(wrong.all(axis=1)), [3, 17])
+        assert wrong.sum() == 2 * wrong.shape[1]
+
+
+@needs_native
+@pytest.mark.parametrize("backend", KERNELS)
+def test_a_cell_shows_the_same_bits_whatever_is_shown_with_it(backend: str) -> None:
+    cells = Domain.filling(Box((0, 0, 0), (14, 13, 12)))
+    p = problem(1, cells=len(cells))
+    every = np.arange(len(cells), dtype=np.int32)
+
+    def parts(chosen: IntArray, threads: int) -> list[FloatArray]:
+        arguments = (p.state, chosen, cells.neighbours, 1, 3, p.weights, 0.5)
+        return list(native.decode_parts(*arguments, instructions=backend, threads=threads))
+
+    whole = parts(every, 1)
+    for chosen, threads in ((every, 3), (every[5:1900], 2), (every[::-1].copy(), 2)):
+        for got, expected in zip(parts(chosen, threads), whole, strict=True):
+            np.testing.assert_array_equal(got, expected[chosen])
 
 
 @pytest.mark.parametrize("factor", [1, 2, 3, 8])
@@ -370,18 +433,21 @@ def test_cells_and_parts_that_cannot_be_are_refused() -> None:
     cells = domain()
     p, around = problem(1, cells=len(cells)), cells.neighbours
     chosen = np.arange(3, dtype=np.int32)
-    for factor in (-1, 0, 9):
-        with pytest.raises(ShapeError, match=f"1 to 8 parts along a cell, got {factor}"):
-            native.decode_cells(p.state, chosen, around, factor, p.weights)
+    for parts in (-1, 0, 9):
+        with pytest.raises(ShapeError, match=f"1 to 8 parts along a cell, got {parts}"):
+            native.decode_parts(p.state, chosen, around, parts, 1, p.weights, 0.5)
+    for samples in (-1, 0, 3):
+        with pytest.raises(ShapeError, match=f"3 to 8 points along a cell, got {3 * samples}"):
+            native.decode_parts(p.state, chosen, around, 3, samples, p.weights, 0.5)
     for wrong, neighbours in (
         (changed(chosen, -1), around),
         (changed(chosen, len(cells)), around),
         (np.array([len(cells) - 1], np.int32), changed(around, len(cells) + 1)),
     ):
         with pytest.raises(ShapeError, match="cells or neighbours"):
-            native.decode_cells(p.state, wrong, neighbours, 3, p.weights)
+            native.decode_parts(p.state, wrong, neighbours, 3, 2, p.weights, 0.5)
     with pytest.raises(ShapeError, match="neighbours: expected shape"):
-        native.decode_cells(p.state, chosen, around[:26], 2, p.weights)
+        native.decode_parts(p.state, chosen, around[:26], 2, 2, p.weights, 0.5)
 
 
 @needs_native

@@ -27,7 +27,7 @@ def test_without_a_compiler_the_references_run(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(native, "_native", None)
     monkeypatch.setattr(native, "_reason", "no compiler", raising=False)
     assert torch_decode() is torch_decode("reference") is reference.decode
-    assert array_decode() == (array_reference.decode, array_reference.decode_cells)
+    assert array_decode() == (array_reference.decode, array_reference.decode_parts)
     assert array_decode("reference") == array_decode("numpy") == array_decode()
     for choose in (torch_decode, array_decode):
         with pytest.raises(BackendUnavailableError, match="native cannot run: its extension"):

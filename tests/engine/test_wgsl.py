@@ -110,10 +110,15 @@ def test_what_is_seen_is_what_numpy_sees(channels: int, units: int, with_weights
     cells = np.arange(0, len(domain), 3, dtype=np.int32)
     decoding = backend_named("wgsl").array_decode()
     for factor in (1, 3):
-        expected = readable.decode_cells(state, cells, domain.neighbours, factor, weights)
-        got = decoding.decode_cells(state, cells, domain.neighbours, factor, weights)
+        rows, fractions = subdivided(cells, domain.neighbours, factor)
+        expected = readable.decode(state, rows, fractions, weights)
+        got = decoding.decode(state, rows, fractions, weights)
         assert got.shape == expected.shape
         np.testing.assert_allclose(got, expected, atol=2e-5 * np.abs(expected).max())
+    asked = (state, cells, domain.neighbours, 2, 2, weights, 0.5)
+    shown = zip(decoding.decode_parts(*asked), readable.decode_parts(*asked), strict=True)
+    for got, expected in shown:
+        np.testing.assert_allclose(got, expected, atol=2e-5)
     rows, fractions = subdivided(cells[:0], domain.neighbours, 1)
     assert decoding.decode(state, rows, fractions, weights).shape == (0, 4)
 

@@ -205,6 +205,42 @@ void test_rows_out_of_range() {
             }
 }
 
+// What parts show are the means of what their points do, the same bits with any number of threads.
+void test_means(const Decoder& decoder, const Subdivided& source, int samples) {
+    const int along = source.along, parts = along / samples;
+    const std::size_t count = source.chosen_cells * parts * parts * parts;
+    std::vector<float> seen(source.count * SHOWN), colour(3 * count), change(count);
+    for (const DecodeKernel* const* kernel = decode_kernels(); *kernel != nullptr; ++kernel) {
+        expect(decode(**kernel, decoder, source, seen.data(), 1), "cells are refused");
+        std::vector<double> light(3 * count, 0), density(count, 0);
+        for (std::int64_t i = 0; i < source.count; ++i) {
+            const std::int64_t cell = i / source.each, z = i % along / samples;
+            const std::int64_t x = i / along / along % along / samples, y = i / along % along / samples;
+            const std::size_t at = ((cell * parts + x) * parts + y) * parts + z;
+            const auto limited = [&](double v, double most) { return std::clamp(v, -most, most); };
+            for (int c = 0; c < 3; ++c) {
+                const double v = limited(seen[i * SHOWN + c], 0.5) + 0.5;
+                light[3 * at + c] += v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+            }
+            density[at] += limited(seen[i * SHOWN + 3], 0.25);
+        }
+        for (double& value : light) value /= samples * samples * samples;
+        for (double& value : density) value /= samples * samples * samples;
+        for (const int threads : THREADS) {
+            std::vector<float> other(3 * count, 1e30f), changes(count, 1e30f);
+            const Shown to = {samples, 0.25f, other.data(), changes.data()};
+            expect(decode_parts(**kernel, decoder, source, to, threads), "cells are refused");
+            if (threads == THREADS[0]) {
+                colour = other;
+                change = changes;
+            }
+            expect(other == colour && changes == change, "other bits with other threads");
+        }
+        expect(error(colour, light) <= 5e-6, "light is off");
+        expect(error(change, density) <= 5e-6, "density is off");
+    }
+}
+
 // The parts of cells are points like others: those of a table whose entries are all different.
 void test_parts_of_cells() {
     const Problem p({"parts", 0, 40, 12, 8});
@@ -224,17 +260,13 @@ void test_parts_of_cells() {
                 expect(std::abs(total - 1) < 1e-6, "shares do not add up to one");
             }
         }
-        std::vector<float> alone(parts.count * SHOWN), together(parts.count * SHOWN);
-        for (const DecodeKernel* const* kernel = decode_kernels(); *kernel != nullptr; ++kernel) {
-            expect(decode(**kernel, p.decoder(), parts, alone.data(), 1), "cells are refused");
-            for (const int threads : THREADS) {
-                decode(**kernel, p.decoder(), parts, together.data(), threads);
-                expect(alone == together, "other bits with other threads");
-            }
-        }
+        for (int samples = 1; samples <= factor; ++samples)
+            if (factor % samples == 0) test_means(p.decoder(), parts, samples);
+        std::vector<float> colour(cells.size() * 3), change(cells.size());
+        const Shown whole = {factor, 0.5f, colour.data(), change.data()};
         for (const std::int32_t wrong : {-1, 40, INT32_MAX}) {
             const std::int32_t before = std::exchange(cells.back(), wrong);
-            expect(!decode(**decode_kernels(), p.decoder(), parts, alone.data(), 2),
+            expect(!decode_parts(**decode_kernels(), p.decoder(), parts, whole, 2),
                    "a cell out of range is accepted");
             cells.back() = before;
         }

@@ -38,9 +38,6 @@ def test_without_a_decoder_states_are_interpolated() -> None:
     between = Between(rule(decoder=False))
     at_cells = between.at(state, *cells.corners(cells.cells))
     np.testing.assert_array_equal(at_cells, state[:-1, :4])
-    every = np.arange(len(cells), dtype=np.int32)
-    in_cells = between.in_cells(state, every, cells.neighbours, 1)
-    np.testing.assert_array_equal(in_cells[:, 0, 0, 0], state[:-1, :4])
     halfway = between.at(state, *cells.corners(cells.cells + np.array([0, 0, 0.5])))
     beside = np.append(state, state[-1:], axis=0)[cells.neighbours[14]]
     np.testing.assert_allclose(halfway, (state[:-1] + beside)[:, :4] / 2, atol=1e-7)
@@ -74,17 +71,17 @@ def test_colours_and_densities_come_through_the_decoder(backend: str) -> None:
 
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("decoder", [True, False])
-def test_parts_of_cells_are_seen_as_the_points_that_they_are(backend: str, decoder: bool) -> None:
+def test_parts_of_cells_show_what_their_points_do(backend: str, decoder: bool) -> None:
     cells = domain()
     state, between = state_of(cells), Between(rule(decoder=decoder), backend)
-    chosen = np.array([5, 0, len(cells) - 1], np.int32)
-    parts = between.in_cells(state, chosen, cells.neighbours, 4)
-    steps = (np.arange(4) + 0.5) / 4 - 0.5
-    points = cells.cells[chosen][:, None, None, None] + np.stack(
+    colour, change = between.parts(state, cells, 8)
+    steps = (np.arange(8) + 0.5) / 8 - 0.5
+    points = cells.cells[:, None, None, None] + np.stack(
         np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1
     )
     seen = between.at(state, *cells.corners(points.reshape(-1, 3)))
-    np.testing.assert_allclose(parts, seen.reshape(parts.shape), atol=2e-6)
+    np.testing.assert_allclose(colour, colours(seen).reshape(colour.shape), atol=5e-6)
+    np.testing.assert_allclose(1 + change, density_factors(seen).reshape(change.shape), atol=5e-6)
 
 
 @pytest.mark.parametrize("border", ["replicate", "circular"])

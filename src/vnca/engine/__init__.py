@@ -203,11 +203,11 @@ class ArrayDecode(NamedTuple):
 
     Attributes:
         decode: What is seen at points, called as `vnca.engine.native.decode` is.
-        decode_cells: What is seen in the parts of cells, called as `native.decode_cells` is.
+        decode_parts: What the parts of cells show, called as `native.decode_parts` is.
     """
 
     decode: Callable[..., FloatArray]
-    decode_cells: Callable[..., FloatArray]
+    decode_parts: Callable[..., tuple[FloatArray, FloatArray]]
 
 
 class Backend(ABC):

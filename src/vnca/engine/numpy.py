@@ -4,11 +4,13 @@ Forward only: what runs where nothing else can. `engine/reference/equations.py` 
 tensors, with gradients and the derivation.
 """
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
 
 from vnca.core import FloatArray, IntArray
+from vnca.core.colour import srgb_to_linear
 from vnca.engine import ArrayDecode, Backend, Compute, Job, Session, StepSession
 from vnca.engine.automaton import OUTPUTS, DecoderWeights, Weights, changing_rows
 from vnca.engine.domain import subdivided
@@ -66,24 +68,35 @@ def decode(
     return result
 
 
-def decode_cells(
+def decode_parts(
     state: FloatArray,
     cells: IntArray,
     neighbours: IntArray,
-    factor: int,
+    parts: int,
+    samples: int,
     weights: DecoderWeights | None,
-) -> FloatArray:
-    """What is seen `[m, factor, factor, factor, 4]`; arguments are those of `native.decode_cells`.
+    most: float,
+    *,
+    decode: Callable[..., FloatArray] = decode,
+    points_at_once: int = POINT_SLAB,
+) -> tuple[FloatArray, FloatArray]:
+    """What parts of cells show; arguments and result are those of `native.decode_parts`.
 
-    Without weights that is the interpolated state.
+    Without weights that is the interpolated state. Points are shown by `decode`, about
+    `points_at_once` of them.
     """
-    result = np.empty((len(cells), *3 * (factor,), OUTPUTS), dtype=state.dtype)
-    at_once = max(1, POINT_SLAB // factor**3)
+    each = (len(cells), *3 * (parts,))
+    colour, change = np.empty((*each, 3), state.dtype), np.empty(each, state.dtype)
+    along = parts * samples
+    at_once = max(1, points_at_once // along**3)
     for start in range(0, len(cells), at_once):
         slab = slice(start, start + at_once)
-        rows, fractions = subdivided(cells[slab], neighbours, factor)
-        result[slab] = decode(state, rows, fractions, weights).reshape(result[slab].shape)
-    return result
+        seen = decode(state, *subdivided(cells[slab], neighbours, along), weights)
+        seen = seen.reshape(-1, *3 * (parts, samples), OUTPUTS)
+        light = srgb_to_linear(np.clip(seen[..., :3] + 0.5, 0, 1))
+        colour[slab] = light.mean((2, 4, 6))
+        change[slab] = np.clip(seen[..., 3], -most, most).mean((2, 4, 6))
+    return colour, change
 
 
 def interpolate(state: FloatArray, rows: IntArray, fractions: FloatArray) -> FloatArray:
@@ -121,7 +134,7 @@ class NumpyBackend(Backend):
 
     def array_decode(self, *, threads: int | None = None) -> ArrayDecode:
         """See `Backend.array_decode`."""
-        return ArrayDecode(decode, decode_cells)
+        return ArrayDecode(decode, decode_parts)
 
 
 BACKEND = NumpyBackend()

@@ -12,7 +12,7 @@ from vnca.core.errors import OptionError
 from vnca.engine import Compute, open_session
 from vnca.engine.domain import Domain
 from vnca.rule import Rule
-from vnca.rule.paint import Between, colour_means, colours, parts_of_cells, require_refinement
+from vnca.rule.paint import Between, colours, require_refinement
 from vnca.rule.styles import in_style
 
 SMALLEST, LARGEST = 8, 384
@@ -194,10 +194,7 @@ def border_jump(block: FloatArray) -> float:
 def _parts(decoded: _Decoded, factor: int) -> FloatArray:
     """Linear RGB on a grid `factor` times as fine, of what a decoder shows."""
     domain, state, between = decoded
-    values = []
-    for _, seen in parts_of_cells(between, state, domain, factor):
-        values.append(colour_means(seen))
-    parts = np.concatenate(values).reshape(len(domain), *3 * (factor,), 3)
-    dense = domain.scatter(parts, domain.box).transpose(0, 3, 1, 4, 2, 5, 6)
+    colour, _ = between.parts(state, domain, factor)
+    dense = domain.scatter(colour, domain.box).transpose(0, 3, 1, 4, 2, 5, 6)
     size = (factor * cells for cells in domain.box.shape)
     return np.ascontiguousarray(dense).reshape(*size, 3)

@@ -1,7 +1,6 @@
 """What a state shows, part of a cell by part: colours, and factors of density."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -9,14 +8,7 @@ from vnca.core import AnyArray
 from vnca.direction.mixing import Answer, Parts
 from vnca.engine import Compute
 from vnca.painting.state import Ready, RollState
-from vnca.rule.paint import (
-    Between,
-    colour_means,
-    colours,
-    density_factors,
-    density_means,
-    parts_of_cells,
-)
+from vnca.rule.paint import Between, colours, density_factors
 
 
 def parts_of(
@@ -46,17 +38,5 @@ def parts_of(
     offsets = np.indices(3 * (finer,), np.int32).reshape(3, -1).T
     at = (state.cells[:, None] * finer + offsets).reshape(-1, 3)
     at = at.astype(np.int32, copy=False)
-    strengths = strength(at)
-    colour = np.empty((len(domain), *3 * (finer,), 3), np.float32)
-    factors = np.empty(colour.shape[:-1], np.float32)
-    for some, seen in parts_of_cells(between, state.values, domain, finer):
-        colour[some] = colour_means(seen)
-        factors[some] = density_means(seen, strength=_of_cells(strengths, some, finer))
-    return Parts(at, colour.reshape(-1, 3), factors.reshape(-1))
-
-
-def _of_cells(answer: Answer, some: slice, finer: int) -> Any:
-    """An answer for all parts of cells, in some of the cells, beside the points in each part."""
-    if isinstance(answer, (int, float)):
-        return answer
-    return answer.reshape(-1, *3 * (finer, 1))[some]
+    colour, change = between.parts(state.values, domain, finer)
+    return Parts(at, colour.reshape(-1, 3), 1 + strength(at) * change.reshape(-1))

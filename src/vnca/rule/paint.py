@@ -1,6 +1,5 @@
 """From the state of cells to what is seen of it: at them, between them and in their parts."""
 
-from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -59,7 +58,7 @@ class Between:
         if weights is None:
             decode = backend_named("numpy").array_decode()
         self._at = partial(decode.decode, weights=weights)
-        self._in_cells = partial(decode.decode_cells, weights=weights)
+        self._parts = partial(decode.decode_parts, weights=weights, most=DENSITY_LIMIT)
 
     def at(self, state: FloatArray, rows: IntArray, fractions: FloatArray) -> FloatArray:
         """What is seen `[m, 4]` at points of a state `[n + 1, C]`.
@@ -71,64 +70,28 @@ class Between:
         """
         return self._at(state, rows, fractions)
 
-    def in_cells(
-        self, state: FloatArray, cells: IntArray, neighbours: IntArray, factor: int
-    ) -> FloatArray:
-        """What is seen `[m, factor, factor, factor, 4]` at the centres of the parts of cells.
+    def parts(self, state: FloatArray, domain: Domain, parts: int) -> tuple[FloatArray, FloatArray]:
+        """What all cells show, part by part: means over `SAMPLES` points along each axis.
 
         Args:
             state: Of a domain `[n + 1, C]`.
-            cells: `[m]` rows of the cells that are to be seen.
-            neighbours: `[27, n]` of the domain.
-            factor: Parts along each axis of a cell, at most 8.
+            domain: Its cells.
+            parts: Along each axis of a cell, at most 8.
 
-        Raises:
-            ShapeError: If the native kernel runs, and there are more.
+        Returns:
+            Linear RGB `[n, parts, parts, parts, 3]`, and Δd `[n, parts, parts, parts]` within its
+            limits.
         """
-        return self._in_cells(state, cells, neighbours, factor)
+        cells = np.arange(len(domain), dtype=np.int32)
+        return self._parts(state, cells, domain.neighbours, parts, SAMPLES[parts])
 
 
 SAMPLES = {1: 3, 2: 2, 3: 2, 4: 2, 5: 1, 6: 1, 7: 1, 8: 1}
 """Points along each axis of a part at which a decoder is asked, by how many parts a cell has along
 it: what is finer than the parts is averaged, instead of becoming grain."""
-_POINTS_AT_ONCE = 1 << 20
 
 
 def require_refinement(factor: int) -> None:
     """Raise `OptionError` unless paintings can be so many times as fine as the smoke."""
     if factor not in SAMPLES:
         raise OptionError(f"`refine` {factor}: must be from 1 to {max(SAMPLES)}")
-
-
-def parts_of_cells(
-    between: Between, state: FloatArray, domain: Domain, parts: int
-) -> Iterator[tuple[slice, FloatArray]]:
-    """What is seen in the cells of a domain, some of them at a time.
-
-    Args:
-        between: What is seen between cells.
-        state: `[n + 1, C]`.
-        domain: Its cells.
-        parts: Of a cell along each axis.
-
-    Yields:
-        Which cells, and `[m, parts, s, parts, s, parts, s, 4]`, s points along each axis of a part.
-    """
-    samples = SAMPLES[parts]
-    along = parts * samples
-    at_once = max(1, _POINTS_AT_ONCE // along**3)
-    for start in range(0, len(domain), at_once):
-        some = slice(start, min(start + at_once, len(domain)))
-        rows = np.arange(some.start, some.stop, dtype=np.int32)
-        seen = between.in_cells(state, rows, domain.neighbours, along)
-        yield some, seen.reshape(len(rows), *3 * (parts, samples), -1)
-
-
-def colour_means(seen: FloatArray) -> FloatArray:
-    """Linear RGB `[m, parts, parts, parts, 3]` of what `parts_of_cells` gives."""
-    return colours(seen).mean((2, 4, 6))
-
-
-def density_means(seen: FloatArray, *, strength: float | FloatArray) -> FloatArray:
-    """Factors of the density `[m, parts, parts, parts]` of what `parts_of_cells` gives."""
-    return density_factors(seen, strength=strength).mean((2, 4, 6))

@@ -291,40 +291,45 @@ def decode(
     return out
 
 
-def decode_cells(
+def decode_parts(
     state: FloatArray,
     cells: IntArray,
     neighbours: IntArray,
-    factor: int,
+    parts: int,
+    samples: int,
     weights: DecoderWeights,
+    most: float,
     *,
     threads: int | None = None,
     instructions: str = "",
-) -> FloatArray:
-    """What is seen at the centres of the `factor`³ parts of each of some cells, not clamped.
+) -> tuple[FloatArray, FloatArray]:
+    """What the parts of some cells show: means over `samples`³ points in each part.
 
     Args:
         state: As of `decode`.
         cells: `[m]` rows of the cells.
         neighbours: `[27, n]` rows of the state around each cell; n for the outside.
-        factor: Parts along each axis of a cell, at most 8.
+        parts: Along each axis of a cell.
+        samples: Points along each axis of a part, at the centres of that many pieces of it; not
+            more than 8 along a cell.
         weights: As of `decode`.
+        most: How far Δd counts.
         threads: As of `decode`.
         instructions: As of `decode`.
 
     Returns:
-        `[m, factor, factor, factor, 4]`: colour as sRGB − ½, and Δd.
+        Linear RGB in [0, 1] `[m, parts, parts, parts, 3]`, and Δd `[m, parts, parts, parts]`.
 
     Raises:
         BackendUnavailableError: See `decode`.
-        ShapeError: See `decode`; or if the factor is not from 1 to 8.
+        ShapeError: See `decode`; or if there are more points.
     """
-    parts = 3 * (max(0, factor),)
-    out = np.empty((len(cells), *parts, OUTPUTS), np.float32)
-    arguments = (state, cells, neighbours, factor, tuple(weights), out)
+    each = (len(cells), *3 * (max(0, parts),))
+    colour, change = np.empty((*each, 3), np.float32), np.empty(each, np.float32)
+    arguments = (state, cells, neighbours, parts, samples, tuple(weights), most, colour, change)
     options = (threads or default_threads(), instructions)
-    checked(_OPERATION, extension().decode_subdivided, *arguments, *options)
-    return out
+    checked(_OPERATION, extension().decode_parts, *arguments, *options)
+    return colour, change
 
 
 def decode_backward(
@@ -391,7 +396,7 @@ class NativeBackend(Backend):
 
     def array_decode(self, *, threads: int | None = None) -> ArrayDecode:
         """See `Backend.array_decode`."""
-        return ArrayDecode(partial(decode, threads=threads), partial(decode_cells, threads=threads))
+        return ArrayDecode(partial(decode, threads=threads), partial(decode_parts, threads=threads))
 
 
 BACKEND = NativeBackend()

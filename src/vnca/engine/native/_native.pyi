@@ -106,13 +106,16 @@ def decode_forward(
     instructions: str,
     /,
 ) -> None: ...
-def decode_subdivided(
+def decode_parts(
     state: FloatArray,
     cells: IntArray,
     neighbours: IntArray,
-    factor: int,
+    parts: int,
+    samples: int,
     weights: Sequence[FloatArray],
-    out: FloatArray,
+    most: float,
+    colour: FloatArray,
+    change: FloatArray,
     threads: int,
     instructions: str,
     /,

@@ -4,9 +4,10 @@ The page of `vnca view` runs the same shaders in a browser.
 """
 
 import importlib.util
-from functools import cache
+from functools import cache, partial
 
 from vnca.engine import ArrayDecode, Backend, Compute, Job, Session
+from vnca.engine.numpy import decode_parts
 
 
 class WgslBackend(Backend):
@@ -28,9 +29,10 @@ class WgslBackend(Backend):
 
     def array_decode(self, *, threads: int | None = None) -> ArrayDecode:
         """See `Backend.array_decode`."""
-        from vnca.engine.wgsl.decode import decode, decode_cells
+        from vnca.engine.wgsl.decode import POINTS_AT_ONCE, decode
 
-        return ArrayDecode(decode, decode_cells)
+        parts = partial(decode_parts, decode=decode, points_at_once=POINTS_AT_ONCE)
+        return ArrayDecode(decode, parts)
 
 
 @cache

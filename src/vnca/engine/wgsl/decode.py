@@ -4,7 +4,6 @@ import numpy as np
 
 from vnca.core import FloatArray, IntArray
 from vnca.engine.automaton import OUTPUTS, DecoderWeights
-from vnca.engine.domain import subdivided
 from vnca.engine.wgsl import device
 from vnca.engine.wgsl.device import Buffer, bound, dispatched, pipeline, require_device, source
 from vnca.engine.wgsl.parts import Rows, require_bindings
@@ -55,21 +54,6 @@ def decode(
         dispatched(ready, [bound(ready, bindings), network], -(-count // THREADS))
         result[some] = seen.read(np.float32).reshape(-1, OUTPUTS)
     return result
-
-
-def decode_cells(
-    state: FloatArray,
-    cells: IntArray,
-    neighbours: IntArray,
-    factor: int,
-    weights: DecoderWeights | None,
-) -> FloatArray:
-    """What is seen `[m, factor, factor, factor, 4]`; arguments are those of `native.decode_cells`.
-
-    Without weights that is the interpolated state.
-    """
-    rows, fractions = subdivided(cells, neighbours, factor)
-    return decode(state, rows, fractions, weights).reshape(len(cells), *3 * (factor,), OUTPUTS)
 
 
 def packed_decoder(weights: DecoderWeights) -> FloatArray:

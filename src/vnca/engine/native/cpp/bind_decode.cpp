@@ -59,18 +59,18 @@ const DecodeKernel& kernel_named(const std::string& name) {
     throw nb::value_error(("this machine does not run the native kernel for " + name).c_str());
 }
 
-void decode_to(const std::string& instructions, const Decoder& decoder, const PointSource& source,
-               float* out, int threads, const std::string& wrong) {
-    const DecodeKernel& kernel = kernel_named(instructions);
+const char* const WRONG_ROWS = "rows: expected rows of the state, from 0 to ";
+
+// Works without the interpreter; `work` says whether all rows were in range.
+template <class Work>
+void require_valid(const Work& work, const char* wrong, const Decoder& decoder) {
     bool valid;
     {
         nb::gil_scoped_release released;
-        valid = decode(kernel, decoder, source, out, threads);
+        valid = work();
     }
     if (!valid) throw nb::value_error((wrong + std::to_string(decoder.cells)).c_str());
 }
-
-const char* const WRONG_ROWS = "rows: expected rows of the state, from 0 to ";
 
 std::vector<Extent> extents(const Input& state, const InputWeights& weights,
                             std::initializer_list<Extent> others) {
@@ -97,23 +97,30 @@ void bind_decode(nb::module_& m) {
         const Scattered source = scattered(rows, fractions);
         float* const to = data_of<float>(out, "out", {source.count, SHOWN});
         check_apart({out}, extents(state, weights, {rows, fractions}));
-        decode_to(instructions, decoder, source, to, threads, WRONG_ROWS);
+        const DecodeKernel& kernel = kernel_named(instructions);
+        require_valid([&] { return decode(kernel, decoder, source, to, threads); }, WRONG_ROWS,
+                      decoder);
     });
 
-    m.def("decode_subdivided", [](Input state, Input cells, Input neighbours, int factor,
-                                  const InputWeights& weights, Output out, int threads,
-                                  const std::string& instructions) {
+    m.def("decode_parts", [](Input state, Input cells, Input neighbours, int parts, int samples,
+                             const InputWeights& weights, float most, Output colour, Output change,
+                             int threads, const std::string& instructions) {
         const Decoder decoder = checked(state, weights);
-        in_range("parts along a cell", factor, 1, Subdivided::FINEST);
+        in_range("parts along a cell", parts, 1, Subdivided::FINEST);
+        in_range("points along a cell", std::int64_t(parts) * samples, parts, Subdivided::FINEST);
+        const std::int64_t count = length(cells, 0);
         const std::int32_t* const around =
             data_of<std::int32_t>(neighbours, "neighbours", {NEIGHBOURS, decoder.cells});
-        const Subdivided source(data_of<std::int32_t>(cells, "cells", {ANY}), length(cells, 0),
-                                around, factor);
-        float* const to =
-            data_of<float>(out, "out", {length(cells, 0), factor, factor, factor, SHOWN});
-        check_apart({out}, extents(state, weights, {cells, neighbours}));
-        decode_to(instructions, decoder, source, to, threads,
-                  "cells or neighbours: expected cells, and rows of the state, below and up to ");
+        const Subdivided source(data_of<std::int32_t>(cells, "cells", {ANY}), count, around,
+                                parts * samples);
+        const Shown to = {
+            samples, most, data_of<float>(colour, "colour", {count, parts, parts, parts, SHOWN - 1}),
+            data_of<float>(change, "change", {count, parts, parts, parts})};
+        check_apart({colour, change}, extents(state, weights, {cells, neighbours}));
+        const DecodeKernel& kernel = kernel_named(instructions);
+        require_valid([&] { return decode_parts(kernel, decoder, source, to, threads); },
+                      "cells or neighbours: expected cells, and rows of the state, below and up to ",
+                      decoder);
     });
 
     m.def("decode_backward", [](Input state, Input rows, Input fractions,
@@ -137,13 +144,8 @@ void bind_decode(nb::module_& m) {
         std::vector<Extent> outputs(to_weights.begin(), to_weights.end());
         outputs.emplace_back(to_state);
         check_apart(outputs, extents(state, weights, {rows, fractions, gradient}));
-        bool valid;
-        {
-            nb::gil_scoped_release released;
-            valid = decode_backward(kernel, decoder, source, from, to, threads);
-        }
-        if (!valid)
-            throw nb::value_error((WRONG_ROWS + std::to_string(decoder.cells)).c_str());
+        require_valid([&] { return decode_backward(kernel, decoder, source, from, to, threads); },
+                      WRONG_ROWS, decoder);
     });
 }
 

@@ -111,43 +111,45 @@ bool Scattered::find(const Decoder& decoder, std::int64_t begin, Points& points)
     return std::int64_t(largest) <= decoder.cells;
 }
 
-Subdivided::Subdivided(const std::int32_t* chosen_cells, std::int64_t cells,
-                       const std::int32_t* neighbours_of, int factor)
-    : PointSource(cells * factor * factor * factor),
-      chosen(chosen_cells),
+Subdivided::Subdivided(const std::int32_t* cells, std::int64_t count_of_cells,
+                       const std::int32_t* neighbours_of, int points_along)
+    : PointSource(count_of_cells * points_along * points_along * points_along),
+      chosen(cells),
       neighbours(neighbours_of),
-      parts(factor * factor * factor) {
-    for (int part = 0; part < parts; ++part) {
-        const int place[] = {part / (factor * factor), part / factor % factor, part % factor};
+      chosen_cells(count_of_cells),
+      along(points_along),
+      each(along * along * along) {
+    for (int point = 0; point < each; ++point) {
+        const int place[] = {point / (along * along), point / along % along, point % along};
         float fraction[3];
         int first = 0;  // neighbour at the first corner
         for (int axis = 0; axis < 3; ++axis) {
-            const int twice = 2 * place[axis] + 1 - factor;  // from the centre, in 1/2 parts
+            const int twice = 2 * place[axis] + 1 - along;  // from the centre, in 1/2 parts
             first = 3 * first + (twice < 0 ? 0 : 1);
-            const double from_centre = twice / (2.0 * factor);
+            const double from_centre = twice / (2.0 * along);
             fraction[axis] = float(twice < 0 ? from_centre + 1 : from_centre);
         }
         for (int k = 0; k < CORNERS; ++k)
-            offsets[part][k] = std::int8_t(first + (k >> 2) * 9 + (k >> 1 & 1) * 3 + (k & 1));
-        share_out(fraction, shares[part], 1);
+            offsets[point][k] = std::int8_t(first + (k >> 2) * 9 + (k >> 1 & 1) * 3 + (k & 1));
+        share_out(fraction, shares[point], 1);
     }
 }
 
 bool Subdivided::find(const Decoder& decoder, std::int64_t begin, Points& points) const {
     std::uint32_t largest = 0;
-    std::int64_t at = begin / parts;
-    int part = int(begin % parts);
+    std::int64_t at = begin / each;
+    int point = int(begin % each);
     for (int i = 0; i < points.count; ++i) {
         const std::int32_t cell = chosen[at];
         if (cell < 0 || cell >= decoder.cells) return false;
         for (int k = 0; k < CORNERS; ++k) {
-            const std::int32_t row = neighbours[offsets[part][k] * decoder.cells + cell];
+            const std::int32_t row = neighbours[offsets[point][k] * decoder.cells + cell];
             points.corners[k][i] = row;
-            points.shares[k][i] = shares[part][k];
+            points.shares[k][i] = shares[point][k];
             largest = std::max(largest, std::uint32_t(row));
         }
-        if (++part == parts) {
-            part = 0;
+        if (++point == each) {
+            point = 0;
             ++at;
         }
     }
@@ -171,6 +173,53 @@ bool decode(const DecodeKernel& kernel, const Decoder& decoder, const PointSourc
                            out + begin * SHOWN);
         };
         if (!each_block(decoder, source, ranges.begin(range), ranges.end(range), visit))
+            valid = false;
+    });
+    return valid;
+}
+
+bool decode_parts(const DecodeKernel& kernel, const Decoder& decoder, const Subdivided& source,
+                  const Shown& to, int threads) {
+    const int along = source.along, parts = along / to.samples, each = parts * parts * parts;
+    std::int16_t part_of[Subdivided::MOST];
+    for (int point = 0; point < source.each; ++point) {
+        const int x = point / (along * along) / to.samples, y = point / along % along / to.samples;
+        part_of[point] = std::int16_t((x * parts + y) * parts + point % along / to.samples);
+    }
+    const float share = float(each) / float(source.each);
+    const DecodeSizes sizes = kernel.sizes(decoder);
+    const Ranges ranges(source.chosen_cells, std::max<std::int64_t>(1, SMALLEST / source.each));
+    threads = std::max(1, std::min(threads, ranges.count));
+    Floats packed(sizes.packed);
+    kernel.pack(decoder, packed.data());
+    std::vector<Floats> scratch;
+    for (int t = 0; t < threads; ++t) scratch.emplace_back(sizes.scratch);
+    std::atomic<bool> valid = true;
+
+    ThreadPool::of_process().run(ranges.count, threads, [&](int range, int worker) {
+        float seen[BLOCK * SHOWN] = {}, sums[Subdivided::MOST][SHOWN] = {};
+        std::int64_t cell = ranges.begin(range);
+        int point = 0;
+        const auto visit = [&](std::int64_t, const Points& points) {
+            kernel.forward(decoder, packed.data(), points, scratch[worker].data(), seen);
+            kernel.light(seen, points.count, to.most);
+            for (int i = 0; i < points.count; ++i) {
+                float* const sum = sums[part_of[point]];
+                for (int c = 0; c < SHOWN; ++c) sum[c] += seen[i * SHOWN + c];
+                if (++point < source.each) continue;
+                for (int part = 0; part < each; ++part) {
+                    const std::int64_t at = cell * each + part;
+                    for (int c = 0; c < SHOWN - 1; ++c)
+                        to.colour[at * (SHOWN - 1) + c] = share * sums[part][c];
+                    to.change[at] = share * sums[part][SHOWN - 1];
+                }
+                std::fill_n(sums[0], each * SHOWN, 0.0f);
+                point = 0;
+                ++cell;
+            }
+        };
+        if (!each_block(decoder, source, cell * source.each, ranges.end(range) * source.each,
+                        visit))
             valid = false;
     });
     return valid;

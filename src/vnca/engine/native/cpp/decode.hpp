@@ -31,17 +31,18 @@ struct Scattered final : PointSource {
     bool find(const Decoder&, std::int64_t begin, Points&) const override;
 };
 
-// The centres of the factor³ parts of each of some cells [chosen], cell by cell, z fastest;
-// `neighbours` [27, cells] are the rows of the state around each cell.
+// Points in some cells [chosen], cell by cell, `along`³ in each, z fastest: the centres of its parts
+// if it is cut into so many. `neighbours` [27, cells] are the rows of the state around each cell.
 struct Subdivided final : PointSource {
-    static constexpr int FINEST = 8, PARTS = FINEST * FINEST * FINEST;
+    static constexpr int FINEST = 8, MOST = FINEST * FINEST * FINEST;
     const std::int32_t *chosen, *neighbours;
-    int parts;
-    std::int8_t offsets[PARTS][CORNERS];  // rows of `neighbours`
-    float shares[PARTS][CORNERS];
+    std::int64_t chosen_cells;
+    int along, each;                     // points along and in a cell
+    std::int8_t offsets[MOST][CORNERS];  // rows of `neighbours`
+    float shares[MOST][CORNERS];
 
-    Subdivided(const std::int32_t* chosen_cells, std::int64_t cells,
-               const std::int32_t* neighbours_of, int factor);
+    Subdivided(const std::int32_t* cells, std::int64_t count_of_cells,
+               const std::int32_t* neighbours_of, int points_along);
     bool find(const Decoder&, std::int64_t begin, Points&) const override;
 };
 
@@ -50,9 +51,18 @@ struct DecodeGradients {
     float *state, *weights[LAYERS], *biases[LAYERS];
 };
 
-// Both return false, leaving their output undefined, if a row is out of range; they never read or
+// What the parts of cells show, `samples`³ points in each: means of linear light and of Δd from −most
+// to most, to `colour` [chosen, parts, 3] and `change` [chosen, parts].
+struct Shown {
+    int samples;
+    float most;
+    float *colour, *change;
+};
+
+// All return false, leaving their output undefined, if a row is out of range; they never read or
 // write through such an index. They throw where there is not enough memory.
 bool decode(const DecodeKernel&, const Decoder&, const PointSource&, float* out, int threads);
+bool decode_parts(const DecodeKernel&, const Decoder&, const Subdivided&, const Shown&, int threads);
 bool decode_backward(const DecodeKernel&, const Decoder&, const PointSource&, const float* gradient,
                      const DecodeGradients&, int threads);
 

@@ -4,6 +4,7 @@
 
 #include "multiply.hpp"
 #include "sine.hpp"
+#include "srgb.hpp"
 #include "vector.hpp"
 
 namespace vnca::VNCA_TARGET {
@@ -179,6 +180,17 @@ void forward(const Decoder& d, const float* packed, const Points& points, float*
              });
 }
 
+void light(float* seen, int points, float most) {
+    static_assert(LANES % SHOWN == 0);
+    Ints of_density;
+    for (int lane = 0; lane < LANES; ++lane) of_density[lane] = lane % SHOWN == SHOWN - 1 ? -1 : 0;
+    for (int j = 0; j < points * SHOWN; j += LANES) {
+        const Vec v = load(seen + j);
+        const Vec colour = linear_light(limited(v + 0.5f, 0, 1));
+        store(seen + j, chosen(of_density, limited(v, -most, most), colour));
+    }
+}
+
 void backward(const Decoder& d, const float* packed, const Points& points, const float* gradient,
               float* memory, float* to_weights, float* state) {
     const Layout at(d);
@@ -237,6 +249,6 @@ void backward(const Decoder& d, const float* packed, const Points& points, const
 
 }  // namespace
 
-extern const DecodeKernel decode_kernel = {NAME(VNCA_TARGET), sizes, pack, forward, backward};
+extern const DecodeKernel decode_kernel = {NAME(VNCA_TARGET), sizes, pack, forward, light, backward};
 
 }  // namespace vnca::VNCA_TARGET

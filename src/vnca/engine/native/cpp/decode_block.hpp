@@ -50,6 +50,9 @@ struct DecodeKernel {
     // out [count, SHOWN] = what is seen at the points.
     void (*forward)(const Decoder&, const float* packed, const Points&, float* scratch, float* out);
 
+    // Makes of what is seen at points, whole vectors of it, linear light and Δd from −most to most.
+    void (*light)(float* seen, int points, float most);
+
     // Adds to `weights` the gradients of each layer's [weights | bias]ᵀ, and to `state` (rows given
     // by the slots) that of the cells around the points.
     void (*backward)(const Decoder&, const float* packed, const Points&, const float* gradient,

@@ -16,9 +16,9 @@ struct Ranges {
     std::int64_t items, length;
     int count;
 
-    explicit Ranges(std::int64_t n)
+    explicit Ranges(std::int64_t n, std::int64_t smallest = SMALLEST)
         : items(n),
-          length(std::max(SMALLEST, (n + TASKS - 1) / TASKS)),
+          length(std::max(smallest, (n + TASKS - 1) / TASKS)),
           count(int((n + length - 1) / length)) {}
 
     std::int64_t begin(int range) const { return range * length; }
