@@ -33,7 +33,7 @@ from vnca.training.scenes.smoke import smoke_bounds
 VIEWS = [Viewpoint(azimuth, 8.0) for azimuth in (0.0, 90.0, 180.0, 270.0)]
 PLAIN = SmokeFormat(velocity_grid=NO_VELOCITY)
 CELLS_OF_BLUR = 0.5, 1.0
-"""Of the gradients. Strokes are three cells wide: a sixth of that sees the marks in them, too."""
+"""Of the gradients. Strokes are two cells wide: a quarter of that sees the marks in them, too."""
 LEAST = 0.5
 """Part of a guide that lies in the picture, from which on it has a direction there."""
 

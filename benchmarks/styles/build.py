@@ -14,7 +14,8 @@ iterations at `--appearance.style-scale 2`: the woodcut went on at that for 150 
 (`--init`) and for 80 more with `--overflow 600 -s 2`, the threads for 400 on a texture and 200 on
 smoke as above. The engraving began with the woodcut before: 100 of the 300 iterations on its
 texture that `--graft woodcut --texture 3 --iterations 100` asks for, then, by `--init` of that, 50
-of 80 on the smoke. States live for 640 steps: as long as films are.
+of 80 on the smoke. The fur began with the engraving (`--graft engraving --texture 3 --iterations
+100`). States live for 640 steps: as long as films are.
 
 What a model tells of the smoke that it was trained on is left out: the library paints
 other smoke.

@@ -17,7 +17,7 @@ COOK = "from vnca_houdini import node; node.cook(hou.pwd())"
 _PAINT = "from vnca_houdini import node; node.paint(hou.pwd())"
 _GO_ON = "from vnca_houdini import node; node.paint(hou.pwd(), goes_on=True)"
 STYLES = (
-    *("cafe", "church", "embers", "engraving", "frost", "harvest"),
+    *("cafe", "church", "embers", "engraving", "frost", "fur", "harvest"),
     *("ink", "marble", "stained_glass", "threads", "woodcut"),
 )
 
