@@ -21,7 +21,9 @@ LAST, SIDE = 24, 176
 SMOKE = ("--resolution", 36, "--frames", LAST)
 PAINTED = ("--frames", f"{LAST - 3}-{LAST}", "--refine", 2, "--without-film")
 SEEN = ("--rows", SIDE, "--columns", SIDE, "--frames", LAST, "--light", 0.9)
-GLASS, FROST, FIELD, CUT, TWO = "stained_glass", "frost", "harvest", "woodcut", "two_styles"
+GLASS, FROST, LINES, FUR = "stained_glass", "frost", "engraving", "fur"
+TWO = "two_styles"
+LONG = ("--frames", f"{LAST - 11}-{LAST}")
 DATA = HERE.parents[1] / "src" / "vnca" / "data"
 LEARNT = DATA / "vangogh_cafe_terrace.webp", DATA / "rust.webp"
 """The pictures of a rule of two styles."""
@@ -35,10 +37,12 @@ CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "advected": (GLASS, ("--strength", "advected(smooth x:0.4..0.6)")),
     "density_strength": (GLASS, ("--density-strength", 0)),
     "steps_per_frame": (GLASS, ("--steps-per-frame", 2)),
+    "pattern_speed": (LINES, (*LONG, "--pattern-speed", 0)),
     "style_mix": (TWO, ("--style-mix", "rust=smooth x:0.4..0.6")),
     "style_half": (TWO, ("--style-mix", "rust=0.5")),
-    "guide": (FIELD, ("--guide", "z")),
-    "pattern_size": (CUT, ("--pattern-size", 2)),
+    "guide": (LINES, ("--guide", "z")),
+    "pattern_size": (LINES, ("--pattern-size", 2)),
+    "blend": (FUR, ("--blend", "engraving=0.5")),
     "layers": (GLASS, ("--layers", "frost=smooth x:0.4..0.6")),
     "hue": (GLASS, ("--hue", 140)),
     "saturation": (GLASS, ("--saturation", 0.3)),
@@ -52,6 +56,8 @@ CONTROLS: dict[str, tuple[str, tuple[object, ...]]] = {
     "fire": (GLASS, ("--fire", "height:0..0.7->2200..900")),
 }
 """The style, and the options of each."""
+BEFORE: dict[str, tuple[object, ...]] = {"pattern_speed": LONG}
+"""Options of both pictures, not of the second alone."""
 THIN = ("--gamma", 0.4)
 SHOWN: dict[str, tuple[object, ...]] = {"density_strength": THIN, "silhouette": THIN}
 """How both pictures are filmed where not as all others: density is seen in thin smoke."""
@@ -78,7 +84,8 @@ def main(folder: str) -> None:
         filled = [str(each).format(work=work, here=HERE) for each in options]
         shown = SHOWN.get(name, ())
         light = ("--colour-grid", "emission", "--light", 0) if name == "fire" else shown
-        before = seen(style, work, shown=shown)
+        both = BEFORE.get(name, ())
+        before = seen(style, work, f"before_{name}" if both else "plain", *both, shown=shown)
         after = seen(style, work, name, *filled, shown=light)
         gap = np.ones((SIDE, 4, 3), np.float32)
         sides = [read_image(before), gap, read_image(after)]
