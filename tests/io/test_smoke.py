@@ -163,6 +163,17 @@ def test_a_file_that_says_its_units_is_believed(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_smoke(tmp_path / "a.vdb", other).velocity, velocity)
 
 
+def test_smoke_can_be_written_as_half_floats(tmp_path: Path) -> None:
+    volume = drifting(3, speed=4)
+    write_smoke(tmp_path / "a.vdb", volume, half=True)
+    with open_vdb(tmp_path / "a.vdb") as file:
+        assert all(header.is_half for header in file.grids.values())
+    got = read_smoke(tmp_path / "a.vdb", PLAIN)
+    assert volume.velocity is not None
+    np.testing.assert_allclose(got.density.sum(), volume.density.sum(), rtol=1e-3)
+    assert got.velocity.max() == volume.velocity.max()
+
+
 def test_files_with_y_up_are_turned(tmp_path: Path) -> None:
     path = saved(tmp_path / "s.vdb", grid("density", density()), grid("velocity", vectors()))
     form = SmokeFormat(up_axis="y")

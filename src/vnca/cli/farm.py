@@ -193,15 +193,15 @@ def run_plan(arguments: Sequence[str]) -> None:
     region = sequence_region(sequence, options.smoke, watch)
     kind = config.domain
     counts = list(counted(sequence, options.smoke, region, config.dilation, kind))
-    costs = measured_costs(model, options.refine, watch, again=options.again)
+    half = any(count.half for count in counts)
+    costs = measured_costs(model, options.refine, watch, half=half, again=options.again)
     exchange = None
     finer = model.rule.decoder is not None
     sizes = {"grid": 1 if finer else options.refine, "finer": options.refine if finer else 1}
     most_smoke = max(count.smoke for count in counts)
     if options.tile is not None:
         fullest = max(zip(counts, sequence, strict=True), key=lambda each: each[0].cells)[1]
-        active, _, _ = active_cells(fullest, options.smoke)
-        alive = around(active, config.dilation)
+        alive = around(active_cells(fullest, options.smoke).cells, config.dilation)
         exchange = exchanged(alive, options.tile, options.halo, options.ranks)
         most_smoke = min(most_smoke, exchange.largest)
     plan = planned(

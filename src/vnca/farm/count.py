@@ -17,6 +17,22 @@ from vnca.io.vdb import open_vdb
 from vnca.io.vdb_smoke import density_header
 
 
+class Active(NamedTuple):
+    """What the nodes of a file's trees tell.
+
+    Attributes:
+        cells: Which cells of the density's grid are active.
+        volume: Of each in the world.
+        copied: Bytes of the other grids.
+        half: Whether density is saved as half floats, and so the painting is.
+    """
+
+    cells: Field
+    volume: float
+    copied: int
+    half: bool
+
+
 class Count(NamedTuple):
     """The cells of a frame, on the grid of the smoke.
 
@@ -25,12 +41,14 @@ class Count(NamedTuple):
         smoke: Active cells of the density's grid: what is painted, at least.
         cells: Cells of the automaton, at most: it leaves out smoke that is too thin.
         copied: Bytes of the file's other grids, which a painted file has, too.
+        half: As of `Active`.
     """
 
     frame: int
     smoke: int
     cells: int
     copied: int
+    half: bool = False
 
 
 def counted(
@@ -52,15 +70,16 @@ def counted(
     cell = abs(np.linalg.det(region.lattice.to_world[:3, :3]))
     whole = math.prod(region.box.grown(dilation).shape)
     for frame in sequence:
-        active, volume, copied = active_cells(frame, smoke)
-        share = volume / cell  # cells of the lattice in one of the file
-        alive = around(active, dilation)
+        active = active_cells(frame, smoke)
+        share = active.volume / cell  # cells of the lattice in one of the file
+        alive = around(active.cells, dilation)
         count = whole if kind == "box" else round(int(alive.values.sum()) * share)
-        yield Count(frame.number, round(int(active.values.sum()) * share), count, copied)
+        held = round(int(active.cells.values.sum()) * share)
+        yield Count(frame.number, held, count, active.copied, active.half)
 
 
-def active_cells(frame: Frame, smoke: SmokeFormat) -> tuple[Field, float, int]:
-    """Which cells of a file are active, the volume of each in the world, and bytes that are copied.
+def active_cells(frame: Frame, smoke: SmokeFormat) -> Active:
+    """Which cells of a file are active, and what else its headers tell.
 
     Formats that do not tell apart from their values are read whole.
 
@@ -72,7 +91,7 @@ def active_cells(frame: Frame, smoke: SmokeFormat) -> tuple[Field, float, int]:
         volume = read_smoke(frame.path, replace(smoke, velocity_grid=NO_VELOCITY))
         density, matrix = volume.density_field, volume.index_to_world
         active = replace(density, values=density.values > 0, outside=False).trimmed()
-        return active, abs(float(np.linalg.det(matrix[:3, :3]))), 0
+        return Active(active, abs(float(np.linalg.det(matrix[:3, :3]))), 0, False)
     with open_vdb(frame.path) as file:
         header = density_header(file, smoke)
         grid = header.read_active()
@@ -80,7 +99,8 @@ def active_cells(frame: Frame, smoke: SmokeFormat) -> tuple[Field, float, int]:
         others = (g for g in file.grids.values() if g.name != header.name and g.parent is None)
         copied = sum(other.stored_bytes for other in others)
         matrix = header.transform.index_to_world
-    return active.trimmed(), abs(float(np.linalg.det(matrix[:3, :3]))), copied
+    volume = abs(float(np.linalg.det(matrix[:3, :3])))
+    return Active(active.trimmed(), volume, copied, header.is_half)
 
 
 def around(active: Field, dilation: int) -> Field:

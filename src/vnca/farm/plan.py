@@ -69,13 +69,16 @@ class Costs:
     disk: Line
 
 
-def measured_costs(model: Model, refine: int, watch: Watch, *, again: bool = False) -> Costs:
+def measured_costs(
+    model: Model, refine: int, watch: Watch, *, half: bool = False, again: bool = False
+) -> Costs:
     """The costs of painting with a model on this machine; from the cache if they are known.
 
     Args:
         model: The model.
         refine: How many times as fine as the smoke's the grid of the painting is.
         watch: Is told that it takes a moment.
+        half: Whether files hold half floats.
         again: Measure again.
 
     Raises:
@@ -87,6 +90,7 @@ def measured_costs(model: Model, refine: int, watch: Watch, *, again: bool = Fal
         platform.processor() or platform.machine(),
         os.cpu_count(),
         refine,
+        half,
         rule.decoder is not None,
         asdict(rule.config),
     ]
@@ -96,7 +100,7 @@ def measured_costs(model: Model, refine: int, watch: Watch, *, again: bool = Fal
         return known
     watch.note("measuring what a cell costs on this machine, once; vnca plan `again` does it again")
     radii = [max(6, round(radius / refine**0.5)) for radius in _RADII]
-    found = [_trial(model, radius, refine) for radius in radii]
+    found = [_trial(model, radius, refine, half=half) for radius in radii]
     cells = [trial.cells for trial in found]
     costs = Costs(
         Line.through(cells, [trial.begin for trial in found]),
@@ -124,7 +128,7 @@ class _Trial:
     disk: float
 
 
-def _trial(model: Model, radius: int, refine: int) -> _Trial:
+def _trial(model: Model, radius: int, refine: int, *, half: bool) -> _Trial:
     """Paint a ball of smoke that rises by a cell a frame, and measure that."""
     rule = model.rule
     density, dilation = rule.scales.density, rule.config.dilation
@@ -137,7 +141,7 @@ def _trial(model: Model, radius: int, refine: int) -> _Trial:
         for frame in range(_FRAMES):
             place = (0, 0, frame)
             smoke = Volume(np.float32(density) * ball, rise, place, np.eye(4), frame=frame)
-            write_smoke(folder / f"ball_{frame}.vdb", smoke)
+            write_smoke(folder / f"ball_{frame}.vdb", smoke, half=half)
         model.save(Path(name) / MODEL_NAME)
         words = [sys.executable, "-m", "vnca", "stylize", name, str(folder)]
         words += ["--out", str(out), "--refine", str(refine), "--velocity-units", "cells/frame"]
@@ -149,9 +153,9 @@ def _trial(model: Model, radius: int, refine: int) -> _Trial:
         ends = [path.stat().st_mtime for path in painted]
         alive, sizes = [], []
         for number, target in enumerate(painted):
-            active, _, copied = active_cells(Frame(number, folder / target.name), SmokeFormat())
-            alive.append(int(around(active, dilation).values.sum()))
-            sizes.append(target.stat().st_size - copied)
+            active = active_cells(Frame(number, folder / target.name), SmokeFormat())
+            alive.append(int(around(active.cells, dilation).values.sum()))
+            sizes.append(target.stat().st_size - active.copied)
     seconds = (ends[-1] - ends[0]) / (len(ends) - 1)
     begin = max(0.0, ends[0] - begun - seconds)
     return _Trial(alive[-1], begin, seconds, sizes[-1])

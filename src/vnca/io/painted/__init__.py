@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -113,11 +114,12 @@ def write_painted(
         _paint_vdb(path, opened, format, frame, told)
 
 
-def write_smoke(path: str | Path, volume: Volume) -> None:
+def write_smoke(path: str | Path, volume: Volume, *, half: bool = False) -> None:
     """Write density and velocity of a volume as a VDB file that default options read back.
 
     The file has +z up, and both grids only where there is density; velocity is in cells per
-    frame at cell centres, which its metadata `velocity_units` records.
+    frame at cell centres, which its metadata `velocity_units` records. With `half` values are
+    saved as half floats.
 
     Raises:
         OutputError: If the path cannot be written, or has another suffix than `.vdb`.
@@ -127,14 +129,11 @@ def write_smoke(path: str | Path, volume: Volume) -> None:
     transform = Transform.from_matrix(volume.index_to_world)
     density, velocity = volume.density_field, volume.velocity_field
     active = replace(density, values=density.values > 0, outside=False).trimmed()
-    grids = [
-        Grid.from_fields("density", density, active, transform=transform, grid_class="fog volume")
-    ]
+    grid = partial(Grid.from_fields, transform=transform, half=half)
+    grids = [grid("density", density, active, grid_class="fog volume")]
     if velocity is not None:
         units = {UNITS_METADATA: CELLS_PER_FRAME}
-        grids.append(
-            Grid.from_fields("velocity", velocity, active, transform=transform, metadata=units)
-        )
+        grids.append(grid("velocity", velocity, active, metadata=units))
     write_vdb(path, grids)
 
 
