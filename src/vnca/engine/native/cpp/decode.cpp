@@ -36,6 +36,24 @@ bool each_block(const Decoder& decoder, const PointSource& source, std::int64_t 
     return true;
 }
 
+// What seeing takes: the weights, shared by all threads, and room for each.
+struct Seeing {
+    const DecodeKernel& kernel;
+    const Decoder& decoder;
+    Floats packed;
+    std::vector<Floats> scratch;
+
+    Seeing(const DecodeKernel& with, const Decoder& what, int threads)
+        : kernel(with), decoder(what), packed(with.sizes(what).packed) {
+        kernel.pack(decoder, packed.data());
+        for (int t = 0; t < threads; ++t) scratch.emplace_back(kernel.sizes(decoder).scratch);
+    }
+
+    void operator()(const Points& points, int worker, float* out) {
+        kernel.forward(decoder, packed.data(), points, scratch[worker].data(), out);
+    }
+};
+
 // Sums the gradient of the state that the points of one range cause. Every row that is met gets a
 // slot: the outside the first, the others as they come.
 class Gathering {
@@ -158,19 +176,14 @@ bool Subdivided::find(const Decoder& decoder, std::int64_t begin, Points& points
 
 bool decode(const DecodeKernel& kernel, const Decoder& decoder, const PointSource& source,
             float* out, int threads) {
-    const DecodeSizes sizes = kernel.sizes(decoder);
     const Ranges ranges(source.count);
     threads = std::max(1, std::min(threads, ranges.count));
-    Floats packed(sizes.packed);
-    kernel.pack(decoder, packed.data());
-    std::vector<Floats> scratch;
-    for (int t = 0; t < threads; ++t) scratch.emplace_back(sizes.scratch);
+    Seeing see(kernel, decoder, threads);
     std::atomic<bool> valid = true;
 
     ThreadPool::of_process().run(ranges.count, threads, [&](int range, int worker) {
         const auto visit = [&](std::int64_t begin, const Points& points) {
-            kernel.forward(decoder, packed.data(), points, scratch[worker].data(),
-                           out + begin * SHOWN);
+            see(points, worker, out + begin * SHOWN);
         };
         if (!each_block(decoder, source, ranges.begin(range), ranges.end(range), visit))
             valid = false;
@@ -187,13 +200,9 @@ bool decode_parts(const DecodeKernel& kernel, const Decoder& decoder, const Subd
         part_of[point] = std::int16_t((x * parts + y) * parts + point % along / to.samples);
     }
     const float share = float(each) / float(source.each);
-    const DecodeSizes sizes = kernel.sizes(decoder);
     const Ranges ranges(source.chosen_cells, std::max<std::int64_t>(1, SMALLEST / source.each));
     threads = std::max(1, std::min(threads, ranges.count));
-    Floats packed(sizes.packed);
-    kernel.pack(decoder, packed.data());
-    std::vector<Floats> scratch;
-    for (int t = 0; t < threads; ++t) scratch.emplace_back(sizes.scratch);
+    Seeing see(kernel, decoder, threads);
     std::atomic<bool> valid = true;
 
     ThreadPool::of_process().run(ranges.count, threads, [&](int range, int worker) {
@@ -201,7 +210,7 @@ bool decode_parts(const DecodeKernel& kernel, const Decoder& decoder, const Subd
         std::int64_t cell = ranges.begin(range);
         int point = 0;
         const auto visit = [&](std::int64_t, const Points& points) {
-            kernel.forward(decoder, packed.data(), points, scratch[worker].data(), seen);
+            see(points, worker, seen);
             kernel.light(seen, points.count, to.most);
             for (int i = 0; i < points.count; ++i) {
                 float* const sum = sums[part_of[point]];
