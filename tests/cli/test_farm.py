@@ -72,7 +72,7 @@ def test_a_plan_is_printed(vnca: Vnca, model: Path, smoke: Path) -> None:
     outcome = vnca("plan", smoke, "--model", model, "--machines", 2, "--tile", 8, "--ranks", 3)
     assert outcome.code == 0
     assert re.match(r"3 frames, at most [\d,]+ cells of the automaton \(frame 1\)", outcome.out)
-    for word in ("time ", "on 2 like it", "memory  0.19 GB", "disk ", "each 4 steps", "3 ranks, 4"):
+    for word in ("time ", "on 2 like it", "memory  0.14 GB", "disk ", "each 4 steps", "3 ranks, 4"):
         assert word in outcome.out
     told = json.loads(vnca("plan", smoke, "--model", model, "--tile", 8, "--json").out)
     assert [frame["frame"] for frame in told["frames"]] == [1, 2, 3]
