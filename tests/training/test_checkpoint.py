@@ -1,4 +1,6 @@
 import json
+import os
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -231,6 +233,23 @@ def test_a_truncated_checkpoint_is_refused(written: Path, tmp_path: Path, keep: 
     path.write_bytes(written.read_bytes()[:keep])
     with pytest.raises(FileFormatError, match=r"short\.safetensors"):
         Checkpoint.load(path)
+
+
+def test_a_checkpoint_is_written_under_no_name_but_ours(
+    written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or a program that is killed meanwhile would leave a file that nobody removes."""
+    made: list[int] = []
+
+    def make(*args: Any, **options: Any) -> tuple[int, str]:
+        handle, name = mkstemp(*args, **options)
+        made.append(os.stat(handle).st_ino)
+        return handle, name
+
+    checkpoint, mkstemp = Checkpoint.load(written), tempfile.mkstemp
+    monkeypatch.setattr(tempfile, "mkstemp", make)
+    checkpoint.save(tmp_path / "again.safetensors")
+    assert made == [(tmp_path / "again.safetensors").stat().st_ino]
 
 
 def test_checkpoints_take_their_share_of_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
