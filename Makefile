@@ -90,10 +90,11 @@ test-lowest: setup
 
 # The native kernel's own tests, which need no Python, under each kind of sanitizer.
 sanitize: setup
-	for kind in thread address,undefined; do \
+	for kind in thread address,undefined,float-cast-overflow; do \
 	  $(BIN)/cmake -S . -B build/sanitize-$$kind -DVNCA_SANITIZE=$$kind && \
 	  $(BIN)/cmake --build build/sanitize-$$kind && \
-	  build/sanitize-$$kind/test_step && build/sanitize-$$kind/test_decode || exit 1; \
+	  build/sanitize-$$kind/test_step && build/sanitize-$$kind/test_decode && \
+	  build/sanitize-$$kind/test_carry || exit 1; \
 	done
 
 # Coverage-guided; the seconds are shared by all targets. Findings are left in build/fuzz.

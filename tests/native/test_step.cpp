@@ -28,6 +28,7 @@ struct Case {
     double alive, changing;  // shares of the cells
     int channels, hidden, priors;
     bool tangled = false;  // any cell may neighbour any other
+    bool steered = false;
 };
 
 constexpr Case CASES[] = {
@@ -41,13 +42,15 @@ constexpr Case CASES[] = {
     {"wide", 5, 6, 7, 1, 1, 64, 512, 16},
     {"many channels", 9, 8, 7, 0.6, 0.5, 20, 100, 2},
     {"tangled", 16, 17, 18, 1, 0.5, 3, 9, 1, true},
+    {"steered", 9, 10, 11, 0.8, 0.5, 12, 64, 4, false, true},
+    {"steered, one channel", 5, 6, 13, 1, 1, 1, 17, 0, false, true},
 };
 
 struct Problem {
     Case of;
     std::int64_t cells = 0;
     std::vector<std::int32_t> neighbours, rows;
-    std::vector<float> state, priors, first, bias, second, gradient;
+    std::vector<float> state, priors, first, bias, second, gradient, steering;
 
     explicit Problem(const Case& c) : of(c) {
         std::mt19937 random(7);
@@ -90,12 +93,15 @@ struct Problem {
         bias = draw(c.hidden, 0.1f);
         second = draw(std::size_t(c.channels) * c.hidden, 0.1f);
         gradient = draw(state.size(), 1);
+        if (c.steered) steering = draw(9 * std::size_t(cells), 1);
     }
 
     Step step() const {
+        // Those that are steered have one divisor.
+        const float y = of.steered ? 1 / 30.0f : 1 / 31.0f, z = of.steered ? y : 1 / 32.0f;
         return {cells, of.channels, of.hidden, of.priors, state.data(), neighbours.data(),
                 priors.data(), first.data(), bias.data(), second.data(),
-                {1.0f, 1 / 30.0f, 1 / 31.0f, 1 / 32.0f, 1 / 26.0f}};
+                {1.0f, 1 / 30.0f, y, z, 1 / 26.0f}, of.steered ? steering.data() : nullptr};
     }
 };
 
@@ -127,6 +133,18 @@ double weight(int filter, int o) {
     return sobel;
 }
 
+// Of a filter around a cell that is steered by F [3, 3]: gradients are turned by it.
+double weight(int filter, int o, const float* steering) {
+    if (steering == nullptr || filter == 0) return weight(filter, o);
+    double sum = 0;
+    if (filter == 4) {
+        for (int i = 0; i < 9; ++i) sum += double(steering[i]) * steering[i];
+        return sum / 3 * weight(4, o);
+    }
+    for (int j = 0; j < 3; ++j) sum += steering[3 * (filter - 1) + j] * weight(1 + j, o);
+    return sum;
+}
+
 float to_bfloat16(float x) {
     std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
     bits += 0x7fff + (bits >> 16 & 1);
@@ -150,11 +168,12 @@ Results<double> exact(const Problem& p, bool bfloat16) {
     std::copy(p.gradient.begin(), p.gradient.end() - s.channels, result.to_state.begin());
     std::vector<double> z(inputs), to_z(inputs), gradient(s.channels);
     for (const std::int64_t row : p.rows) {
+        const float* const steering = s.steering ? s.steering + 9 * row : nullptr;
         const auto each_weight = [&](const auto& visit) {
             for (int k = 0; k < filtered; ++k)
                 for (int o = 0; o < NEIGHBOURS; ++o)
                     visit(k, s.neighbours[o * s.cells + row] * channels + k % channels,
-                          weight(k / channels, o));
+                          weight(k / channels, o, steering));
         };
         std::fill(z.begin(), z.end(), 0);
         std::fill(to_z.begin(), to_z.end(), 0);

@@ -14,8 +14,8 @@ os.environ["BLENDER_USER_RESOURCES"] = _PROFILE  # before bpy is imported
 import bpy
 
 RENDERED = (16, 26, 36)
-SIZE = 280, 400
-_LAMPS = (("Key", 8.0, (55, 0, -50)), ("Fill", 2.5, (70, 0, 35)), ("Rim", 3.0, (60, 0, 140)))
+SIZE = 350, 500
+_LAMPS = (("Key", 14.0, (55, 0, -50)), ("Fill", 4.5, (70, 0, 35)), ("Rim", 4.0, (60, 0, 140)))
 """Suns: what they are called, how strong they are, and how they are turned, degrees."""
 
 
@@ -66,7 +66,7 @@ def main(folder: Path, package: str, style: str) -> None:
     add_studio(scene)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "painted.blend"))
     scene.render.engine = "CYCLES"
-    scene.cycles.device, scene.cycles.samples, scene.cycles.volume_bounces = "CPU", 8, 2
+    scene.cycles.device, scene.cycles.samples, scene.cycles.volume_bounces = "CPU", 12, 2
     scene.cycles.use_denoising = True
     scene.render.resolution_x, scene.render.resolution_y = SIZE
     scene.render.image_settings.file_format = "PNG"

@@ -29,6 +29,8 @@ MOMENTS = (("", 0.0), ("", 1.0), ("{}ing", 0.0), ("{}ing", 3.0))
 """Seconds after work is what it says, or after its start, at which Esc is pressed."""
 TICK = 0.02
 FRAME = 30
+PICTURES = 4
+"""Of a training, until there is something to be seen."""
 ESCAPE = 0xFF1B
 """X11's number of the key."""
 
@@ -58,7 +60,7 @@ def steps() -> Iterator[float]:
         settings.way, settings.picture = "PICTURE", REST[1]
         yield from screenshot("picture.png")
         press("train")
-        while work.current.is_running and not work.current.pictures:
+        while work.current.is_running and work.current.pictures < PICTURES:
             yield 0.1
         yield from screenshot("training.png")
         yield from esc("train", work)
@@ -115,8 +117,8 @@ def esc(name: str, work: Any) -> Iterator[float]:
     """Press Esc, and wait for the end."""
     job, _busy[1] = work.current, 0.0
     what = f"{job.what} {job.done}/{job.total}"
-    press_escape()
     start = time.monotonic()
+    press_escape()
     while job.is_running and time.monotonic() - start < 30:
         yield TICK
     free = time.monotonic()

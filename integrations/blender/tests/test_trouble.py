@@ -130,6 +130,16 @@ def test_a_worker_does_not_outlive_blender(scene: bpy.types.Scene, plume: bpy.ty
     assert job._process.wait(timeout=10) != 0
 
 
+def test_a_worker_that_has_not_begun_has_nothing_to_wait_for(
+    scene: bpy.types.Scene, plume: bpy.types.Object
+) -> None:
+    job = begin(scene)
+    start = time.monotonic()
+    job._process.stdin.close()
+    assert job._process.wait(timeout=60) == 143
+    assert time.monotonic() - start < 4  # it would be ended after 5
+
+
 def test_what_vnca_refuses_is_its_message(
     scene: bpy.types.Scene, plume: bpy.types.Object, folder: Path
 ) -> None:

@@ -104,6 +104,7 @@ def paint(job):
     sys.stderr = Told(show)
     code = main(job["words"])
     sys.stderr = sys.__stderr__
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a moment more, and all is done
     if code == 0:
         files = sorted(str(path) for path in painted.glob("*.vdb") if path.name[0] != ".")
         last = latest(painted, "*.vdb")
@@ -139,6 +140,7 @@ def train(job):
         code = main(job["words"])
     finally:
         sys.stderr = sys.__stderr__
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
         if not (run / "checkpoint.safetensors").exists():  # or going on needs it
             staging.clear(folder)
     if code == 0:
@@ -176,6 +178,8 @@ def missing(job):
 def run(path):
     """Do the job; the exit code is vnca's."""
     job = json.loads(Path(path).read_text(encoding="utf-8"))
+    # Until vnca is at work there is nothing to be written down.
+    signal.signal(signal.SIGTERM, lambda *_: os._exit(143))
     end_with_blender(waits=job["kind"] != "train")
     if absent := missing(job):
         tell("error", message=absent, exit_code=2)

@@ -98,7 +98,9 @@ private:
     // A place beyond the box brought so near that it counts as it did.
     double nearer(double place, int axis) const {
         const double low = lower[axis], size = double(upper[axis]) - low;
-        if (circular) return place - size * std::floor((place - low) / size);
+        // Of a very large number of rounds not even whole ones are left: clamped, as it has to be.
+        if (circular)
+            return std::clamp(place - size * std::floor((place - low) / size), low - 1, low + size);
         return std::clamp(place, low - 4, low + size + 4);
     }
 
