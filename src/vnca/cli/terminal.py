@@ -226,7 +226,8 @@ def terminable() -> Iterator[None]:
 def finishing() -> Iterator[Callable[[], None]]:
     """SIGTERM waits for a piece of work: the function given is called where one is finished.
 
-    It raises `Terminated` if there was a SIGTERM. A second SIGTERM does not wait.
+    It raises `Terminated` if there was a SIGTERM. A second SIGTERM does not wait for the work, only
+    for a frame that is being written meanwhile.
     """
     is_asked = False
 
