@@ -27,6 +27,7 @@ except ImportError as error:
 
 P = ParamSpec("P")
 T = TypeVar("T")
+_OPERATION = "decoding"
 
 
 def unavailable(precision: str = "float32") -> str | None:
@@ -240,9 +241,6 @@ def multiply_adds(
     return extension(precision).multiply_adds(rounds, *how)
 
 
-_OPERATION = "decoding"
-
-
 def decode_instructions() -> list[str]:
     """Instruction sets that decoding can use on this machine, the default first.
 
@@ -310,8 +308,7 @@ def decode_parts(
         cells: `[m]` rows of the cells.
         neighbours: `[27, n]` rows of the state around each cell; n for the outside.
         parts: Along each axis of a cell.
-        samples: Points along each axis of a part, at the centres of that many pieces of it; not
-            more than 8 along a cell.
+        samples: Points along each axis of a part, at most 8 along a cell.
         weights: As of `decode`.
         most: How far Δd counts.
         threads: As of `decode`.
