@@ -82,13 +82,22 @@ class Between:
             Linear RGB `[n, parts, parts, parts, 3]`, and Δd `[n, parts, parts, parts]` within its
             limits.
         """
-        cells = np.arange(len(domain), dtype=np.int32)
-        return self._parts(state, cells, domain.neighbours, parts, SAMPLES[parts])
+        colour = np.empty((len(domain), *3 * (parts,), 3), np.float32)
+        change = np.empty(colour.shape[:-1], np.float32)
+        at_once = max(1, _POINTS_AT_ONCE // (parts * SAMPLES[parts]) ** 3)
+        for start in range(0, len(domain), at_once):
+            cells = np.arange(start, min(start + at_once, len(domain)), dtype=np.int32)
+            asked = (state, cells, domain.neighbours, parts, SAMPLES[parts])
+            some = slice(start, start + len(cells))
+            colour[some], change[some] = self._parts(*asked)
+        return colour, change
 
 
 SAMPLES = {1: 3, 2: 2, 3: 2, 4: 2, 5: 1, 6: 1, 7: 1, 8: 1}
 """Points along each axis of a part at which a decoder is asked, by how many parts a cell has along
 it: what is finer than the parts is averaged, instead of becoming grain."""
+_POINTS_AT_ONCE = 1 << 22
+"""A program can be interrupted between, which in the native core it cannot."""
 
 
 def require_refinement(factor: int) -> None:
