@@ -60,7 +60,7 @@ def main(folder: Path, window: Path, light: Path, out: Path) -> None:
     )
     training = opened(window / "training.png").crop(TRAINING)
     training.save(out / "blender_training.webp", quality=88, method=6)
-    lit(light / "lit.npy").save(out / "blender_light.webp", quality=80, method=6)
+    lit(light / "cafe.npy").save(out / "blender_light.webp", quality=80, method=6)
 
 
 main(*map(Path, sys.argv[1:5]))

@@ -20,6 +20,9 @@ AZIMUTH, ELEVATION, AMBIENT = -55.0, 40.0, 0.15
 SIZE, BLOCK = 64, 4
 SMOKE = HERE.parent.parent.parent / "tests" / "data" / "plume_sphere_0030.vdb"
 PROGRAM = os.environ.get("VNCA_PROGRAM", "")
+ALIKE = {"marble": 0.9, "cafe": 0.85}
+"""How brightness correlates at least. Measured: 0.93 and 0.88; light that is scattered many times
+blurs the strokes of the café, which are as fine as cells."""
 
 
 def ours(path: Path, out: Path) -> np.ndarray:
@@ -57,7 +60,10 @@ def add_light(scene: bpy.types.Scene) -> None:
 
 
 @pytest.mark.skipif(not PROGRAM, reason="VNCA_PROGRAM names no vnca with torch")
-def test_cycles_and_our_film_agree_on_lit_smoke(scene: bpy.types.Scene, folder: Path) -> None:
+@pytest.mark.parametrize("style", ALIKE)
+def test_cycles_and_our_film_agree_on_lit_smoke(
+    scene: bpy.types.Scene, folder: Path, style: str
+) -> None:
     import vnca
 
     volume = bpy.data.volumes.new("Smoke")
@@ -65,7 +71,7 @@ def test_cycles_and_our_film_agree_on_lit_smoke(scene: bpy.types.Scene, folder: 
     smoke = bpy.data.objects.new("Smoke", volume)
     scene.collection.objects.link(smoke)
     settings = scene.vnca
-    settings.source, settings.style, settings.folder = smoke, "cafe", str(folder)
+    settings.source, settings.style, settings.folder = smoke, style, str(folder)
     settings.units, settings.time_scale = "mantaflow", 0.4
     assert bpy.ops.vnca.paint() == {"FINISHED"}
     path = Path(settings.result.data.filepath)
@@ -89,7 +95,7 @@ def test_cycles_and_our_film_agree_on_lit_smoke(scene: bpy.types.Scene, folder: 
     cycles = pixels_of(folder / "cycles.exr")
 
     if kept := os.environ.get("VNCA_KEEP"):  # to be looked at
-        np.save(Path(kept) / "lit.npy", np.concatenate([cycles, film], axis=1))
+        np.save(Path(kept) / f"{style}.npy", np.concatenate([cycles, film], axis=1))
     # As opaque in the same places.
     unlike = abs(cycles[..., 3] - film[..., 3]).mean()
     assert unlike < 0.03
@@ -105,8 +111,8 @@ def test_cycles_and_our_film_agree_on_lit_smoke(scene: bpy.types.Scene, folder: 
     theirs = theirs * (theirs * our).sum() / (theirs**2).sum()  # one exposure for all
     brightness = [colours @ (0.2126, 0.7152, 0.0722) for colours in (theirs, our)]
     hue = [colours / colours.sum(1, keepdims=True) for colours in (theirs, our)]
-    # Measured: 0.88, 0.023 and 0.23.
-    assert np.corrcoef(*brightness)[0, 1] > 0.85
+    assert np.corrcoef(*brightness)[0, 1] > ALIKE[style]
+    # Measured of marble and café: 0.014 and 0.023, 0.26 and 0.23.
     assert abs(hue[0] - hue[1]).mean() < 0.035
     assert abs(theirs - our).mean() / our.mean() < 0.3
     # It is lit from the left, and from above.
