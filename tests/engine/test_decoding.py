@@ -13,16 +13,16 @@ from vnca.core import AnyArray, Box, FloatArray, IntArray
 from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import ShapeError
 from vnca.engine import native
-from vnca.engine import native as native_step
 from vnca.engine import numpy as array_reference
 from vnca.engine.automaton import DecoderWeights
 from vnca.engine.domain import Domain, subdivided
+from vnca.engine.native import decoding
 from vnca.engine.native.autograd import decode as native_decode
 from vnca.engine.reference import equations as reference
 from vnca.engine.triton import decode as triton_backend
 from vnca.engine.triton.step import unavailable
 
-KERNELS = [] if native_step.unavailable() else native.decode_instructions()
+KERNELS = [] if native.unavailable() else decoding.decode_instructions()
 needs_native = pytest.mark.skipif(not KERNELS, reason="the native kernel was not built")
 
 # The Triton kernels run on the GPU if there is one, else in Triton's interpreter.
@@ -46,13 +46,13 @@ class Problem:
         return dataclasses.replace(self, **changes)
 
     def forward(self, **options: object) -> FloatArray:
-        return native.decode(
+        return decoding.decode(
             self.state, self.rows, self.fractions, self.weights, **options  # pyright: ignore
         )  # fmt: skip
 
     def backward(self, **options: object) -> list[FloatArray]:
         arguments = (self.state, self.rows, self.fractions, self.weights, self.gradient)
-        to_state, to_weights = native.decode_backward(*arguments, **options)  # pyright: ignore
+        to_state, to_weights = decoding.decode_backward(*arguments, **options)  # pyright: ignore
         return [to_state, *to_weights]
 
 
@@ -256,7 +256,7 @@ def test_parts_of_cells_show_the_means_of_their_points(
     if backend == "reference":
         colour, change = array_reference.decode_parts(*arguments)
     else:
-        colour, change = native.decode_parts(*arguments, instructions=backend, threads=2)
+        colour, change = decoding.decode_parts(*arguments, instructions=backend, threads=2)
     points = subdivided(chosen, cells.neighbours, parts * samples)
     seen = array_reference.decode(p.state, *points, p.weights).astype(float)
     seen = seen.reshape(5, *3 * (parts, samples), 4)
@@ -273,7 +273,7 @@ def shown(values: FloatArray, backend: str) -> tuple[FloatArray, FloatArray]:
     nothing = DecoderWeights(*(np.zeros(s, np.float32) for s in DecoderWeights.shapes(4, 1)))
     cells = np.arange(len(values), dtype=np.int32)
     arguments = (state, cells, np.tile(cells, (27, 1)), 1, 1, nothing, 0.5)
-    colour, change = native.decode_parts(*arguments, instructions=backend)
+    colour, change = decoding.decode_parts(*arguments, instructions=backend)
     return colour[:, 0, 0, 0], change[:, 0, 0, 0]
 
 
@@ -311,7 +311,7 @@ def test_a_cell_shows_the_same_bits_whatever_is_shown_with_it(backend: str) -> N
 
     def parts(chosen: IntArray, threads: int) -> list[FloatArray]:
         arguments = (p.state, chosen, cells.neighbours, 1, 3, p.weights, 0.5)
-        return list(native.decode_parts(*arguments, instructions=backend, threads=threads))
+        return list(decoding.decode_parts(*arguments, instructions=backend, threads=threads))
 
     whole = parts(every, 1)
     for chosen, threads in ((every, 3), (every[5:1900], 2), (every[::-1].copy(), 2)):
@@ -435,19 +435,19 @@ def test_cells_and_parts_that_cannot_be_are_refused() -> None:
     chosen = np.arange(3, dtype=np.int32)
     for parts in (-1, 0, 9):
         with pytest.raises(ShapeError, match=f"1 to 8 parts along a cell, got {parts}"):
-            native.decode_parts(p.state, chosen, around, parts, 1, p.weights, 0.5)
+            decoding.decode_parts(p.state, chosen, around, parts, 1, p.weights, 0.5)
     for samples in (-1, 0, 3):
         with pytest.raises(ShapeError, match=f"3 to 8 points along a cell, got {3 * samples}"):
-            native.decode_parts(p.state, chosen, around, 3, samples, p.weights, 0.5)
+            decoding.decode_parts(p.state, chosen, around, 3, samples, p.weights, 0.5)
     for wrong, neighbours in (
         (changed(chosen, -1), around),
         (changed(chosen, len(cells)), around),
         (np.array([len(cells) - 1], np.int32), changed(around, len(cells) + 1)),
     ):
         with pytest.raises(ShapeError, match="cells or neighbours"):
-            native.decode_parts(p.state, wrong, neighbours, 3, 2, p.weights, 0.5)
+            decoding.decode_parts(p.state, wrong, neighbours, 3, 2, p.weights, 0.5)
     with pytest.raises(ShapeError, match="neighbours: expected shape"):
-        native.decode_parts(p.state, chosen, around[:26], 2, 2, p.weights, 0.5)
+        decoding.decode_parts(p.state, chosen, around[:26], 2, 2, p.weights, 0.5)
 
 
 @needs_native

@@ -202,8 +202,8 @@ class ArrayDecode(NamedTuple):
     """Decoding of arrays.
 
     Attributes:
-        decode: What is seen at points, called as `vnca.engine.native.decode` is.
-        decode_parts: What the parts of cells show, called as `native.decode_parts` is.
+        decode: What is seen at points, called as `vnca.engine.native.decoding.decode` is.
+        decode_parts: What the parts of cells show, called as `native.decoding.decode_parts` is.
     """
 
     decode: Callable[..., FloatArray]

@@ -54,7 +54,7 @@ def draw(hashes: IntArray, *, seed: int, step: int, probability: float) -> IntAr
 def decode(
     state: FloatArray, rows: IntArray, fractions: FloatArray, weights: DecoderWeights | None
 ) -> FloatArray:
-    """What is seen `[m, 4]` at points; arguments are those of `native.decode`.
+    """What is seen `[m, 4]` at points; arguments are those of `native.decoding.decode`.
 
     Without weights that is the interpolated state.
     """
@@ -80,7 +80,7 @@ def decode_parts(
     decode: Callable[..., FloatArray] = decode,
     points_at_once: int = POINT_SLAB,
 ) -> tuple[FloatArray, FloatArray]:
-    """What parts of cells show; arguments and result are those of `native.decode_parts`.
+    """What parts of cells show; arguments and result are those of `native.decoding.decode_parts`.
 
     Without weights that is the interpolated state. Points are shown by `decode`, about
     `points_at_once` of them.
@@ -100,7 +100,7 @@ def decode_parts(
 
 
 def interpolate(state: FloatArray, rows: IntArray, fractions: FloatArray) -> FloatArray:
-    """The state `[m, C]` between the cells, trilinear; arguments are those of `native.decode`."""
+    """The state `[m, C]` between the cells, trilinear; arguments as of `native.decoding.decode`."""
     total = np.zeros((len(fractions), state.shape[1]), dtype=state.dtype)
     for corner, around in zip(product((0, 1), repeat=3), rows, strict=True):
         share = np.where(corner, fractions, 1 - fractions).prod(axis=1, keepdims=True)

@@ -16,16 +16,9 @@ from torch import Tensor
 from vnca.core import AnyArray
 from vnca.core.camera import Camera
 from vnca.core.errors import OptionError, ShapeError
+from vnca.rendering import march, native
 from vnca.rendering.light import LightVolume
-from vnca.rendering.march import (
-    Samples,
-    gather,
-    paper_weights,
-    ray_weights,
-    running_sum,
-    sample,
-    samples_along,
-)
+from vnca.rendering.march import THINNEST, sample
 
 Mode = Literal["emission-absorption", "paper"]
 
@@ -35,13 +28,8 @@ Shader = Callable[[Tensor], tuple[Tensor, Tensor]]
 
 LEAST_FACTOR = 0.5
 """The least that a shader may multiply density by."""
-# What gets less light through than this is not shaded: an eighth of a step of 8-bit colour.
-_UNSEEN = 5e-4
 # Where the samples of a pixel begin, in steps: each finer grid fills the gaps of the one before.
 _STAGGER = 0.618034
-
-# Density this thin is invisible; below it a colour is no longer divided out.
-_THINNEST = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +78,8 @@ def render(
     """Render smoke by emission and absorption.
 
     Differentiable in `density` and `colour`, except for cells further than a cell from any
-    smoke: rays are not sampled there. Deterministic bit for bit on the CPU.
+    smoke, and for those that so much smoke hides that they could not be seen: rays are not
+    sampled there. The depth is not differentiable. Deterministic bit for bit on the CPU.
 
     Colours of an array: density and density times colour are interpolated, and the colour of a
     sample is their quotient: so what colour the empty cells around the smoke have is of no effect.
@@ -155,7 +144,7 @@ def _averaged(view: View, rows: int, columns: int, along: int) -> View:
 
     opacity = mean(view.opacity)
     depth = mean(torch.where(view.opacity > 0, view.depth * view.opacity, 0))
-    depth = torch.where(opacity > _THINNEST, depth / opacity.clamp_min(_THINNEST), math.inf)
+    depth = torch.where(opacity > THINNEST, depth / opacity.clamp_min(THINNEST), math.inf)
     return View(mean(view.colour), opacity, depth)
 
 
@@ -178,70 +167,38 @@ def _render(
         density.new_tensor(array).view(-1, 3)
         for array in _through_cells(*camera.rays(rows, columns), cells_to_world)
     )
-    if isinstance(colour, Tensor):
+    paper, painted = mode == "paper", isinstance(colour, Tensor)
+    if painted:
         field = torch.cat([density[..., None], density[..., None] * colour], dim=-1)
-    else:
-        field = density[..., None]
     pixels, colours, opacities, depths = [], [], [], []
-    for samples in samples_along(
-        density, origins, directions, near=camera.near, step=step, offset=offset
+    for samples in (native if native.serves(density) else march).samples_along(
+        density,
+        origins,
+        directions,
+        near=camera.near,
+        step=step,
+        offset=offset,
+        extinction=gamma * step * (1 if painted else LEAST_FACTOR),
     ):
-        if isinstance(colour, Tensor):
-            values = samples.table(sample(field, samples.points))
-            thickness = values[..., 0]
-            hue = values[..., 1:] / thickness[..., None].clamp_min(_THINNEST)
+        if painted:
+            values = sample(field, samples.points)
+            dense = values[:, 0]
+            hue = values[:, 1:] / dense[:, None].clamp_min(THINNEST)
         else:
-            thickness, hue = _shaded(field, colour, samples, gamma * step)
+            factors, hue = colour(samples.points)
+            dense = samples.density * factors
         if light is not None:
-            hue = hue * _lit(light, samples, gamma * step * thickness)
-        if mode == "paper":
-            weights, transmittance = paper_weights(thickness, gamma=gamma)
-        else:
-            weights, transmittance = ray_weights(gamma * thickness, step=step)
+            hue = hue * light.at(samples.points)[:, None]
+        seen, passes, depth = samples.light(dense, hue, extinction=gamma * step, paper=paper)
         pixels.append(samples.ray)
-        colours.append(gather(weights, hue))
-        opacities.append(1 - transmittance)
-        depths.append(_mean_depth(weights, samples.depth))
+        colours.append(seen)
+        opacities.append(1 - passes)
+        depths.append(depth)
     return View(
         _picture(pixels, colours, density.new_zeros(rows * columns, 3)).view(rows, columns, 3),
         _picture(pixels, opacities, density.new_zeros(rows * columns)).view(rows, columns),
         _picture(pixels, depths, density.new_full((rows * columns,), math.inf)).view(rows, columns),
     )
-
-
-def _shaded(
-    density: Tensor, shader: Shader, samples: Samples, extinction: float
-) -> tuple[Tensor, Tensor]:
-    """Density `[rays, samples]` and colour `[rays, samples, 3]` of what can be seen.
-
-    Density that nothing behind it could be seen through is left as it is.
-
-    Args:
-        density: `[x, y, z, 1]`.
-        shader: What there is at a point.
-        samples: Where to look.
-        extinction: Of density one, in a step.
-    """
-    plain = sample(density, samples.points)
-    with torch.no_grad():
-        least = samples.table(plain)[..., 0] * (extinction * LEAST_FACTOR)
-        reached = running_sum(least) - least
-        seen = ((reached < -math.log(_UNSEEN)) & (least > 0))[samples.row, samples.column]
-    factors, hues = shader(samples.points[seen])
-    values = torch.cat([plain, plain.new_zeros(len(plain), 3)], -1)
-    painted = torch.cat([plain[seen] * factors[:, None], hues], -1)
-    table = samples.table(values.index_put((seen,), painted))
-    return table[..., 0], table[..., 1:]
-
-
-@torch.no_grad()
-def _lit(light: LightVolume, samples: Samples, thickness: Tensor) -> Tensor:
-    """What the colours `[rays, samples, 3]` that can be seen are multiplied by; others by one."""
-    reached = running_sum(thickness) - thickness
-    seen = ((reached < -math.log(_UNSEEN)) & (thickness > 0))[samples.row, samples.column]
-    factors = thickness.new_ones(len(samples.points))
-    factors[seen] = light.at(samples.points[seen])
-    return samples.table(factors[:, None])
 
 
 def _through_cells(
@@ -252,12 +209,6 @@ def _through_cells(
         return origins, directions
     to_cells = np.linalg.inv(cells_to_world[:3, :3])
     return (origins - cells_to_world[:3, 3]) @ to_cells.T, directions @ to_cells.T
-
-
-def _mean_depth(weights: Tensor, depth: Tensor) -> Tensor:
-    total = weights.sum(1)
-    mean = (weights * depth).sum(1) / total.clamp_min(_THINNEST)
-    return torch.where(total > _THINNEST, mean, math.inf)
 
 
 def _picture(pixels: list[Tensor], values: list[Tensor], empty: Tensor) -> Tensor:

@@ -5,10 +5,10 @@ import pytest
 
 from vnca.core import FloatArray
 from vnca.engine import native
-from vnca.engine import native as native_step
 from vnca.engine.automaton import DecoderWeights
+from vnca.engine.native import decoding
 
-KERNELS = [] if native_step.unavailable() else native.decode_instructions()
+KERNELS = [] if native.unavailable() else decoding.decode_instructions()
 pytestmark = pytest.mark.skipif(not KERNELS, reason="the native kernel was not built")
 
 
@@ -27,9 +27,9 @@ def sines(values: FloatArray, instructions: str) -> tuple[FloatArray, FloatArray
     first = np.concatenate([0 * unit, unit], axis=1)
     weights = DecoderWeights(first, none, small * unit, none, unit, none, unit / small, none)
     arguments = (state, rows, np.zeros((points, 3), np.float32), weights)
-    sine = native.decode(*arguments, instructions=instructions)
+    sine = decoding.decode(*arguments, instructions=instructions)
     ones = np.ones((points, 4), np.float32)
-    to_state, _ = native.decode_backward(*arguments, ones, instructions=instructions)
+    to_state, _ = decoding.decode_backward(*arguments, ones, instructions=instructions)
     return sine.ravel(), to_state[:-1, 4:].ravel()
 
 

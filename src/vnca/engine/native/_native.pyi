@@ -132,3 +132,48 @@ def decode_backward(
     instructions: str,
     /,
 ) -> None: ...
+def find_smoke(
+    density: FloatArray, near: AnyArray, threads: int, /
+) -> tuple[tuple[int, int, int], tuple[int, int, int]]: ...
+def march(
+    density: FloatArray,
+    near: AnyArray,
+    origins: FloatArray,
+    directions: FloatArray,
+    offsets: FloatArray,
+    lower: Sequence[float],
+    upper: Sequence[float],
+    nearest: float,
+    step: float,
+    extinction: float,
+    most: float,
+    threads: int,
+    /,
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]: ...
+def composite(
+    starts: IntArray,
+    density: FloatArray,
+    colour: FloatArray,
+    depth: FloatArray,
+    extinction: float,
+    paper: bool,
+    to_colour: FloatArray,
+    passes: FloatArray,
+    to_depth: FloatArray,
+    threads: int,
+    /,
+) -> None: ...
+def composite_backward(
+    starts: IntArray,
+    density: FloatArray,
+    colour: FloatArray,
+    depth: FloatArray,
+    extinction: float,
+    paper: bool,
+    of_colour: FloatArray,
+    of_passes: FloatArray,
+    to_density: FloatArray,
+    to_colour: FloatArray,
+    threads: int,
+    /,
+) -> None: ...

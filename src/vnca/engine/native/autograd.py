@@ -8,6 +8,7 @@ from torch.autograd.function import once_differentiable
 
 from vnca.engine import native
 from vnca.engine.automaton import DecoderWeights, Weights
+from vnca.engine.native import decoding
 
 
 def update(
@@ -112,7 +113,9 @@ class _Decode(torch.autograd.Function):
         *tensors, ctx.threads = inputs
         ctx.save_for_backward(*tensors)
         state, rows, fractions, *weights = map(_array, tensors)
-        seen = native.decode(state, rows, fractions, DecoderWeights(*weights), threads=ctx.threads)
+        seen = decoding.decode(
+            state, rows, fractions, DecoderWeights(*weights), threads=ctx.threads
+        )
         return torch.from_numpy(seen)
 
     @staticmethod
@@ -121,7 +124,7 @@ class _Decode(torch.autograd.Function):
         ctx: Any, *grad_outputs: Tensor
     ) -> tuple[Tensor | None, ...]:
         state, rows, fractions, *weights = map(_array, ctx.saved_tensors)
-        to_state, to_weights = native.decode_backward(
+        to_state, to_weights = decoding.decode_backward(
             state,
             rows,
             fractions,

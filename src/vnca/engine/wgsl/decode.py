@@ -22,7 +22,7 @@ POINTS_AT_ONCE = 1 << 20
 def decode(
     state: FloatArray, rows: IntArray, fractions: FloatArray, weights: DecoderWeights | None
 ) -> FloatArray:
-    """What is seen `[m, 4]` at points; arguments are those of `native.decode`.
+    """What is seen `[m, 4]` at points; arguments are those of `native.decoding.decode`.
 
     Without weights that is the interpolated state.
     """

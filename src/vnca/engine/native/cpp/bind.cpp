@@ -16,6 +16,7 @@
 #include "arrays.hpp"
 #include "bind_carry.hpp"
 #include "bind_decode.hpp"
+#include "bind_march.hpp"
 #include "fill.hpp"
 #include "mask.hpp"
 #include "step.hpp"
@@ -143,6 +144,7 @@ const Kernel& kernel_named(const std::string& name, bool bfloat16) {
 NB_MODULE(_native, m) {
     m.doc() = "The native kernels; see the native.py of each operation.";
     bind_carry(m);
+    bind_march(m);
     bind_decode(m);
 
     m.def("instructions", [](bool bfloat16) {

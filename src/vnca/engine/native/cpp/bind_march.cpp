@@ -1,0 +1,124 @@
+// The Python side of native marching: checks every array, then works without the interpreter.
+
+#include "bind_march.hpp"
+
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/pair.h>
+
+#include <array>
+#include <cstdint>
+#include <utility>
+
+#include "arrays.hpp"
+#include "march.hpp"
+
+namespace vnca {
+namespace {
+
+using Place = std::array<std::int64_t, 3>;
+using Point = std::array<float, 3>;
+
+Density checked_density(const Input& density, const Input& near) {
+    Density smoke = {data_of<float>(density, "density", {ANY, ANY, ANY}), {}, nullptr};
+    for (int axis = 0; axis < 3; ++axis) smoke.shape[axis] = length(density, axis);
+    smoke.near_smoke = data_of<std::uint8_t>(
+        near, "near", {smoke.shape[0] + 1, smoke.shape[1] + 1, smoke.shape[2] + 1});
+    return smoke;
+}
+
+// An array that owns what it is made of.
+template <class T>
+nb::ndarray<nb::numpy, T> owned(std::vector<T>&& values, std::size_t columns) {
+    auto* const kept = new std::vector<T>(std::move(values));
+    const nb::capsule owner(kept, [](void* it) noexcept { delete static_cast<std::vector<T>*>(it); });
+    if (columns == 1) return nb::ndarray<nb::numpy, T>(kept->data(), {kept->size()}, owner);
+    return nb::ndarray<nb::numpy, T>(kept->data(), {kept->size() / columns, columns}, owner);
+}
+
+Shading checked_shading(const Input& starts, const Input& density, const Input& colour,
+                        const Input& depth, float extinction, bool paper) {
+    const std::int64_t rays = length(starts, 0) - 1, samples = length(density, 0);
+    in_range("rays", rays, 0, INT64_MAX / 8);
+    const Shading shading = {data_of<std::int64_t>(starts, "starts", {rays + 1}),
+                             rays,
+                             data_of<float>(density, "density", {samples}),
+                             data_of<float>(colour, "colour", {samples, 3}),
+                             data_of<float>(depth, "depth", {samples}),
+                             extinction,
+                             paper};
+    bool ordered = shading.starts[0] == 0 && shading.starts[rays] == samples;
+    for (std::int64_t ray = 0; ordered && ray < rays; ++ray)
+        ordered = shading.starts[ray] <= shading.starts[ray + 1];
+    if (!ordered) throw nb::value_error("starts: expected them to ascend from 0 to all samples");
+    return shading;
+}
+
+}  // namespace
+
+void bind_march(nb::module_& m) {
+    m.def("find_smoke", [](Input density, Output near, int threads) {
+        const float* const from = data_of<float>(density, "density", {ANY, ANY, ANY});
+        std::int64_t shape[3];
+        for (int axis = 0; axis < 3; ++axis) shape[axis] = length(density, axis);
+        auto* const to = data_of<std::uint8_t>(near, "near", {shape[0] + 1, shape[1] + 1, shape[2] + 1});
+        check_apart({near}, {density});
+        Bounds bounds;
+        {
+            nb::gil_scoped_release released;
+            bounds = find_smoke(from, shape, to, threads);
+        }
+        return std::pair(Place{bounds.least[0], bounds.least[1], bounds.least[2]},
+                         Place{bounds.most[0], bounds.most[1], bounds.most[2]});
+    });
+
+    m.def("march", [](Input density, Input near, Input origins, Input directions, Input offsets,
+                      const Point& lower, const Point& upper, float nearest, float step,
+                      float extinction, float most, int threads) {
+        const Density smoke = checked_density(density, near);
+        const std::int64_t rays = length(origins, 0), apart = length(offsets, 0) == 1 ? 0 : 1;
+        if (!(step > 0)) throw nb::value_error("step: expected more than zero");
+        Rays along = {data_of<float>(origins, "origins", {rays, 3}),
+                      data_of<float>(directions, "directions", {rays, 3}),
+                      data_of<float>(offsets, "offsets", {apart ? rays : 1}),
+                      rays, apart, {}, {}, nearest, step, extinction, most};
+        // Inside of the smoke's own box, so that every step is in reach of a counter.
+        for (int axis = 0; axis < 3; ++axis) {
+            along.lower[axis] = std::max(lower[axis], -1.0f);
+            along.upper[axis] = std::min(upper[axis], float(smoke.shape[axis]));
+        }
+        Sampled found;
+        {
+            nb::gil_scoped_release released;
+            found = march(smoke, along, threads);
+        }
+        return nb::make_tuple(owned(std::move(found.starts), 1), owned(std::move(found.points), 3),
+                              owned(std::move(found.depth), 1), owned(std::move(found.density), 1));
+    });
+
+    m.def("composite", [](Input starts, Input density, Input colour, Input depth, float extinction,
+                          bool paper, Output to_colour, Output passes, Output to_depth, int threads) {
+        const Shading from = checked_shading(starts, density, colour, depth, extinction, paper);
+        float* const light = data_of<float>(to_colour, "colour of rays", {from.rays, 3});
+        float* const through = data_of<float>(passes, "what passes", {from.rays});
+        float* const deep = data_of<float>(to_depth, "depth of rays", {from.rays});
+        check_apart({to_colour, passes, to_depth}, {starts, density, colour, depth});
+        nb::gil_scoped_release released;
+        composite(from, light, through, deep, threads);
+    });
+
+    m.def("composite_backward", [](Input starts, Input density, Input colour, Input depth,
+                                   float extinction, bool paper, Input of_colour, Input of_passes,
+                                   Output to_density, Output to_colour, int threads) {
+        const Shading from = checked_shading(starts, density, colour, depth, extinction, paper);
+        const std::int64_t samples = from.starts[from.rays];
+        const float* const light = data_of<float>(of_colour, "gradient of colours", {from.rays, 3});
+        const float* const through = data_of<float>(of_passes, "gradient of what passes", {from.rays});
+        float* const dense = data_of<float>(to_density, "gradient of the density", {samples});
+        float* const hue = data_of<float>(to_colour, "gradient of the samples", {samples, 3});
+        check_apart({to_density, to_colour}, {starts, density, colour, depth, of_colour, of_passes});
+        nb::gil_scoped_release released;
+        composite_backward(from, light, through, dense, hue, threads);
+    });
+}
+
+}  // namespace vnca

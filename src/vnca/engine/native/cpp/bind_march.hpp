@@ -1,0 +1,9 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+namespace vnca {
+
+void bind_march(nanobind::module_& m);
+
+}  // namespace vnca

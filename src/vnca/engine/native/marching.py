@@ -1,0 +1,145 @@
+"""Smoke along the rays of a camera, in the native core: its samples, and the light of rays.
+
+What is computed is that of `vnca.rendering.march`, on the CPU and in float32.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from vnca.core import AnyArray, FloatArray, IntArray
+from vnca.core.errors import ShapeError
+from vnca.engine.native import checked, default_threads, extension
+
+_OPERATION = "marching"
+
+
+class Seen(NamedTuple):
+    """Samples that can be seen, ray by ray, near to far.
+
+    Attributes:
+        starts: `[rays + 1]`, the first sample of each ray, and how many there are; int64.
+        points: `[n, 3]`, cell coordinates.
+        depth: `[n]`, along their rays.
+        density: `[n]`, interpolated.
+    """
+
+    starts: IntArray
+    points: FloatArray
+    depth: FloatArray
+    density: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Marcher:
+    """A density `[x, y, z]` that rays are sampled in."""
+
+    density: FloatArray
+    threads: int | None = None
+    """How many to use; by default one for each core."""
+    _near: AnyArray = field(init=False)
+    _box: tuple[list[float], list[float]] | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.density.ndim != 3:
+            raise ShapeError(f"{_OPERATION}: expected a density [x, y, z]")
+        near = np.empty(np.add(self.density.shape, 1), np.uint8)
+        find = extension().find_smoke
+        least, most = checked(_OPERATION, find, self.density, near, self._threads)
+        there = least[0] <= most[0]
+        box = ([float(n - 1) for n in least], [float(n + 1) for n in most]) if there else None
+        object.__setattr__(self, "_near", near)
+        object.__setattr__(self, "_box", box)
+
+    @property
+    def _threads(self) -> int:
+        return self.threads or default_threads()
+
+    def along(
+        self,
+        origins: FloatArray,
+        directions: FloatArray,
+        offsets: FloatArray,
+        *,
+        near: float,
+        step: float,
+        extinction: float,
+        most: float,
+    ) -> Seen | None:
+        """Samples at depths (k + offset) · step for whole k, with smoke within a cell of them.
+
+        Args:
+            origins: `[rays, 3]`, cell coordinates.
+            directions: `[rays, 3]`, cells for each length of depth.
+            offsets: In steps, in [0, 1): `[1]` of all rays, or `[rays]` of each.
+            near: Depth before which nothing is sampled.
+            step: Depth between samples.
+            extinction: Of density one, in a step: the least that it can be.
+            most: Optical depth behind which there is nothing to be seen.
+
+        Returns:
+            The samples; None without smoke.
+
+        Raises:
+            BackendUnavailableError: If the extension was not built.
+            ShapeError: If arrays are not contiguous, or of other shapes or types.
+        """
+        if self._box is None:
+            return None
+        arrays = (self.density, self._near, origins, directions, offsets)
+        how = (*self._box, near, step, extinction, most, self._threads)
+        return Seen(*checked(_OPERATION, extension().march, *arrays, *how))
+
+
+class Shading(NamedTuple):
+    """What the samples of rays show.
+
+    Attributes:
+        starts: As of `Seen`.
+        density: `[n]`, painted.
+        colour: `[n, 3]`, linear RGB.
+        depth: As of `Seen`.
+        extinction: Of density one, in a step.
+        paper: Whether light adds up as the VNCA paper prints it.
+    """
+
+    starts: IntArray
+    density: FloatArray
+    colour: FloatArray
+    depth: FloatArray
+    extinction: float
+    paper: bool
+
+
+def composite(
+    shading: Shading, *, threads: int | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The light of rays.
+
+    Returns:
+        Premultiplied linear RGB `[rays, 3]`, the share of the light from behind that passes
+        `[rays]`, and the mean depth of what is seen `[rays]`, infinite where that is nothing.
+
+    Raises:
+        BackendUnavailableError: If the extension was not built.
+        ShapeError: If arrays are not contiguous, or of other shapes or types.
+    """
+    rays = len(shading.starts) - 1
+    colour, passes, depth = (np.empty(shape, np.float32) for shape in ((rays, 3), rays, rays))
+    how = threads or default_threads()
+    checked("compositing", extension().composite, *shading, colour, passes, depth, how)
+    return colour, passes, depth
+
+
+def composite_backward(
+    shading: Shading, of_colour: FloatArray, of_passes: FloatArray, *, threads: int | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Gradients of density `[n]` and colour `[n, 3]` from those of colours and of what passes.
+
+    Arguments and errors are those of `composite`.
+    """
+    density, colour = np.empty_like(shading.density), np.empty_like(shading.colour)
+    arrays = (*shading, of_colour, of_passes, density, colour)
+    checked("compositing", extension().composite_backward, *arrays, threads or default_threads())
+    return density, colour
