@@ -94,7 +94,7 @@ sanitize: setup
 	  $(BIN)/cmake -S . -B build/sanitize-$$kind -DVNCA_SANITIZE=$$kind && \
 	  $(BIN)/cmake --build build/sanitize-$$kind && \
 	  build/sanitize-$$kind/test_step && build/sanitize-$$kind/test_decode && \
-	  build/sanitize-$$kind/test_carry || exit 1; \
+	  build/sanitize-$$kind/test_carry && build/sanitize-$$kind/test_march || exit 1; \
 	done
 
 # Coverage-guided; the seconds are shared by all targets. Findings are left in build/fuzz.

@@ -7,6 +7,7 @@ from functools import partial
 
 import torch
 from torch import Tensor
+from torch.utils import deterministic
 
 from vnca.core import FloatArray
 from vnca.core.errors import OptionError
@@ -118,3 +119,5 @@ def require_equal_runs(device: torch.device) -> None:
             "not at all"
         )
     torch.use_deterministic_algorithms(True)
+    # It would fill what is about to be written, which takes a twentieth of a training.
+    deterministic.fill_uninitialized_memory = False  # pyright: ignore[reportAttributeAccessIssue]

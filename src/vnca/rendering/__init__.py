@@ -167,9 +167,9 @@ def _render(
         density.new_tensor(array).view(-1, 3)
         for array in _through_cells(*camera.rays(rows, columns), cells_to_world)
     )
-    paper, painted = mode == "paper", isinstance(colour, Tensor)
-    if painted:
-        field = torch.cat([density[..., None], density[..., None] * colour], dim=-1)
+    field, least = density[..., None], LEAST_FACTOR
+    if isinstance(colour, Tensor):
+        field, least = torch.cat([field, field * colour], dim=-1), 1.0
     pixels, colours, opacities, depths = [], [], [], []
     for samples in (native if native.serves(density) else march).samples_along(
         density,
@@ -178,9 +178,9 @@ def _render(
         near=camera.near,
         step=step,
         offset=offset,
-        extinction=gamma * step * (1 if painted else LEAST_FACTOR),
+        extinction=gamma * step * least,
     ):
-        if painted:
+        if isinstance(colour, Tensor):
             values = sample(field, samples.points)
             dense = values[:, 0]
             hue = values[:, 1:] / dense[:, None].clamp_min(THINNEST)
@@ -189,7 +189,9 @@ def _render(
             dense = samples.density * factors
         if light is not None:
             hue = hue * light.at(samples.points)[:, None]
-        seen, passes, depth = samples.light(dense, hue, extinction=gamma * step, paper=paper)
+        seen, passes, depth = samples.light(
+            dense, hue, extinction=gamma * step, paper=mode == "paper"
+        )
         pixels.append(samples.ray)
         colours.append(seen)
         opacities.append(1 - passes)

@@ -11,6 +11,7 @@ from torch.autograd.function import once_differentiable
 
 from vnca.core import FloatArray
 from vnca.engine import native
+from vnca.engine.native.decoding import show, show_backward
 from vnca.engine.native.marching import (
     Marcher,
     Seen,
@@ -111,6 +112,38 @@ class _Light(torch.autograd.Function):
         shading = _shading(ctx, *ctx.saved_tensors)
         gradients = composite_backward(shading, _array(of_colour), _array(of_passes))
         return *map(torch.from_numpy, gradients), None, None, None
+
+
+def shown(seen: Tensor, most: float) -> tuple[Tensor, Tensor]:
+    """What becomes of colours and density where a decoder says so much. Differentiable.
+
+    Args:
+        seen: `[m, 4]`, sRGB minus one half, and Δd.
+        most: How far Δd counts.
+
+    Returns:
+        Linear RGB `[m, 3]`, and 1 + Δd `[m]`.
+    """
+    result = _Shown.apply(seen, most)
+    assert isinstance(result, tuple)
+    return result
+
+
+class _Shown(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, *inputs: Any) -> tuple[Tensor, Tensor]:
+        seen, ctx.most = inputs
+        ctx.save_for_backward(seen)
+        colour, factor = map(torch.from_numpy, show(_array(seen), ctx.most))
+        return colour, factor
+
+    @staticmethod
+    @once_differentiable
+    def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
+        ctx: Any, *grad_outputs: Tensor
+    ) -> tuple[Tensor | None, ...]:
+        (seen,) = map(_array, ctx.saved_tensors)
+        return torch.from_numpy(show_backward(seen, ctx.most, *map(_array, grad_outputs))), None
 
 
 def _shading(ctx: Any, density: Tensor, colour: Tensor) -> Shading:

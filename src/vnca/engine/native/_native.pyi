@@ -132,6 +132,25 @@ def decode_backward(
     instructions: str,
     /,
 ) -> None: ...
+def show(
+    seen: FloatArray,
+    most: float,
+    colour: FloatArray,
+    factor: FloatArray,
+    threads: int,
+    instructions: str,
+    /,
+) -> None: ...
+def show_backward(
+    seen: FloatArray,
+    most: float,
+    of_colour: FloatArray,
+    of_factor: FloatArray,
+    gradient: FloatArray,
+    threads: int,
+    instructions: str,
+    /,
+) -> None: ...
 def find_smoke(
     density: FloatArray, near: AnyArray, threads: int, /
 ) -> tuple[tuple[int, int, int], tuple[int, int, int]]: ...

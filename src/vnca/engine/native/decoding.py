@@ -121,3 +121,47 @@ def decode_backward(
     options = (threads or default_threads(), instructions)
     checked(_OPERATION, extension().decode_backward, *arguments, *options)
     return to_state, to_weights
+
+
+def show(
+    seen: FloatArray, most: float, *, threads: int | None = None, instructions: str = ""
+) -> tuple[FloatArray, FloatArray]:
+    """What becomes of colours and density where so much is seen.
+
+    Args:
+        seen: `[m, 4]` as `decode` has it.
+        most: How far Δd counts.
+        threads: As of `decode`.
+        instructions: As of `decode`.
+
+    Returns:
+        Linear RGB in [0, 1] `[m, 3]`, and 1 + Δd `[m]`.
+
+    Raises:
+        BackendUnavailableError: See `decode`.
+        ShapeError: See `decode`.
+    """
+    colour, factor = np.empty((len(seen), 3), np.float32), np.empty(len(seen), np.float32)
+    options = (threads or default_threads(), instructions)
+    checked("showing", extension().show, seen, most, colour, factor, *options)
+    return colour, factor
+
+
+def show_backward(
+    seen: FloatArray,
+    most: float,
+    of_colour: FloatArray,
+    of_factor: FloatArray,
+    *,
+    threads: int | None = None,
+    instructions: str = "",
+) -> FloatArray:
+    """The gradient of `seen` `[m, 4]` from those of what `show` gives; zero where that is clamped.
+
+    Arguments and errors are those of `show`.
+    """
+    gradient = np.empty_like(seen)
+    arrays = (seen, most, of_colour, of_factor, gradient)
+    options = (threads or default_threads(), instructions)
+    checked("showing", extension().show_backward, *arrays, *options)
+    return gradient

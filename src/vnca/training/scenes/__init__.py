@@ -13,6 +13,7 @@ from vnca.engine import torch_decode
 from vnca.engine.automaton import DecoderWeights
 from vnca.engine.carrying import carried
 from vnca.engine.domain import Domain
+from vnca.rendering import native
 from vnca.rendering.colour import srgb_to_linear
 from vnca.rule import COLOUR, DENSITY_CHANGE, DENSITY_LIMIT, Decoder
 
@@ -213,3 +214,10 @@ def colours(seen: Tensor) -> Tensor:
 def density_factors(seen: Tensor) -> Tensor:
     """1 + Δd `[...]` of states, or of what is seen of them, `[..., C]`; differentiable."""
     return 1 + seen[..., DENSITY_CHANGE].clamp(-DENSITY_LIMIT, DENSITY_LIMIT)
+
+
+def as_light(seen: Tensor) -> tuple[Tensor, Tensor]:
+    """`colours` `[m, 3]` and `density_factors` `[m]` of what a decoder shows `[m, 4]`."""
+    if native.serves(seen):  # as quick as one of its torch operations
+        return native.shown(seen, DENSITY_LIMIT)
+    return colours(seen), density_factors(seen)

@@ -24,7 +24,7 @@ from vnca.rule import SMOKE_THRESHOLD, Rule, gamma_for_own_colour
 from vnca.rule.conditioning import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
 from vnca.rule.conditioning import normalised_velocity, priors
 from vnca.training.config import ViewConfig
-from vnca.training.scenes import Scene, colours, density_factors
+from vnca.training.scenes import Scene, as_light, colours, density_factors
 
 SPEEDS = (0.25, 1.5)
 """How much slower or faster than in the frame augmented smoke moves, at most."""
@@ -306,8 +306,8 @@ class SmokeScene(Scene[SmokeViewpoint]):
     ) -> tuple[Tensor, Tensor]:
         """What a decoded state shows at points `[m, 3]`, as `vnca.rendering.Shader` has it."""
         seen = self.seen(state, points)
-        hues = seen.new_ones(len(seen), 3) if white else colours(seen)
-        return density_factors(seen), hues
+        hues, factors = as_light(seen)
+        return factors, seen.new_ones(len(seen), 3) if white else hues
 
     @torch.no_grad()
     def motion(self, state: Tensor, viewpoint: SmokeViewpoint, size: int) -> tuple[Tensor, Tensor]:

@@ -26,7 +26,7 @@ from vnca.rendering.colour import linear_to_srgb
 from vnca.rendering.march import sample
 from vnca.rule import PRIORS, Decoder
 from vnca.training.config import SliceConfig
-from vnca.training.scenes import Scene, colours
+from vnca.training.scenes import Scene, as_light, colours
 
 Angles = tuple[float, float]
 """Azimuth and elevation, degrees."""
@@ -198,7 +198,7 @@ class BlockScene(Scene[list[Cut]]):
         """Linear RGB `[*, 3]` of a state at points `[*, 3]` in cells; differentiable."""
         if self.decoder is None:
             return shown(self.dense(colours(state[:-1])), points)
-        return colours(self.seen(state, points.view(-1, 3))).view(points.shape)
+        return as_light(self.seen(state, points.view(-1, 3)))[0].view(points.shape)
 
     def drift(self, random: np.random.Generator) -> FloatArray:
         """Any way, about a cell and a half: all of the block alike."""

@@ -123,6 +123,31 @@ void bind_decode(nb::module_& m) {
                       decoder);
     });
 
+    m.def("show", [](Input seen, float most, Output colour, Output factor, int threads,
+                     const std::string& instructions) {
+        const std::int64_t points = length(seen, 0);
+        const float* const from = data_of<float>(seen, "what is seen", {points, SHOWN});
+        float* const light = data_of<float>(colour, "colour", {points, SHOWN - 1});
+        float* const of_density = data_of<float>(factor, "factor", {points});
+        check_apart({colour, factor}, {seen});
+        const DecodeKernel& kernel = kernel_named(instructions);
+        nb::gil_scoped_release released;
+        show(kernel, from, points, most, light, of_density, threads);
+    });
+
+    m.def("show_backward", [](Input seen, float most, Input of_colour, Input of_factor,
+                              Output gradient, int threads, const std::string& instructions) {
+        const std::int64_t points = length(seen, 0);
+        const float* const from = data_of<float>(seen, "what is seen", {points, SHOWN});
+        const auto* const light = data_of<float>(of_colour, "gradient of colour", {points, SHOWN - 1});
+        const auto* const of_density = data_of<float>(of_factor, "gradient of factor", {points});
+        float* const to = data_of<float>(gradient, "gradient", {points, SHOWN});
+        check_apart({gradient}, {seen, of_colour, of_factor});
+        const DecodeKernel& kernel = kernel_named(instructions);
+        nb::gil_scoped_release released;
+        show_backward(kernel, from, points, most, light, of_density, to, threads);
+    });
+
     m.def("decode_backward", [](Input state, Input rows, Input fractions,
                                 const InputWeights& weights, Input gradient, Output to_state,
                                 const OutputWeights& to_weights, int threads,

@@ -234,6 +234,43 @@ bool decode_parts(const DecodeKernel& kernel, const Decoder& decoder, const Subd
     return valid;
 }
 
+// Calls work(begin, count) for some points at a time, which with what they show fit into a cache.
+template <class Work>
+static void each_few(std::int64_t points, int threads, const Work& work) {
+    const Ranges ranges(points, 4 * SMALLEST);
+    ThreadPool::of_process().run(ranges.count, threads, [&](int range, int) {
+        for (std::int64_t begin = ranges.begin(range); begin < ranges.end(range); begin += BLOCK)
+            work(begin, int(std::min<std::int64_t>(BLOCK, ranges.end(range) - begin)));
+    });
+}
+
+void show(const DecodeKernel& kernel, const float* seen, std::int64_t points, float most,
+          float* colour, float* factor, int threads) {
+    each_few(points, threads, [&](std::int64_t begin, int count) {
+        float some[BLOCK * SHOWN] = {};
+        std::copy_n(seen + begin * SHOWN, count * SHOWN, some);
+        kernel.light(some, count, most);
+        for (int i = 0; i < count; ++i) {
+            std::copy_n(some + i * SHOWN, SHOWN - 1, colour + (begin + i) * (SHOWN - 1));
+            factor[begin + i] = 1 + some[i * SHOWN + SHOWN - 1];
+        }
+    });
+}
+
+void show_backward(const DecodeKernel& kernel, const float* seen, std::int64_t points, float most,
+                   const float* of_colour, const float* of_factor, float* gradient, int threads) {
+    each_few(points, threads, [&](std::int64_t begin, int count) {
+        float some[BLOCK * SHOWN] = {}, to[BLOCK * SHOWN] = {};
+        std::copy_n(seen + begin * SHOWN, count * SHOWN, some);
+        for (int i = 0; i < count; ++i) {
+            std::copy_n(of_colour + (begin + i) * (SHOWN - 1), SHOWN - 1, to + i * SHOWN);
+            to[i * SHOWN + SHOWN - 1] = of_factor[begin + i];
+        }
+        kernel.light_backward(some, to, count, most);
+        std::copy_n(to, count * SHOWN, gradient + begin * SHOWN);
+    });
+}
+
 bool decode_backward(const DecodeKernel& kernel, const Decoder& decoder, const PointSource& source,
                      const float* gradient, const DecodeGradients& to, int threads) {
     const DecodeSizes sizes = kernel.sizes(decoder);

@@ -59,6 +59,13 @@ struct Shown {
     float *colour, *change;
 };
 
+// Of what is seen at points [points, SHOWN]: linear light [points, 3] and 1 + Δd [points], Δd from −most
+// to most; and the gradient of what is seen from those of the two.
+void show(const DecodeKernel&, const float* seen, std::int64_t points, float most, float* colour,
+          float* factor, int threads);
+void show_backward(const DecodeKernel&, const float* seen, std::int64_t points, float most,
+                   const float* of_colour, const float* of_factor, float* gradient, int threads);
+
 // All return false, leaving their output undefined, if a row is out of range; they never read or
 // write through such an index. They throw where there is not enough memory.
 bool decode(const DecodeKernel&, const Decoder&, const PointSource&, float* out, int threads);

@@ -180,14 +180,32 @@ void forward(const Decoder& d, const float* packed, const Points& points, float*
              });
 }
 
-void light(float* seen, int points, float most) {
+INLINE Ints lanes_of_density() {
     static_assert(LANES % SHOWN == 0);
     Ints of_density;
     for (int lane = 0; lane < LANES; ++lane) of_density[lane] = lane % SHOWN == SHOWN - 1 ? -1 : 0;
+    return of_density;
+}
+
+void light(float* seen, int points, float most) {
+    const Ints of_density = lanes_of_density();
     for (int j = 0; j < points * SHOWN; j += LANES) {
         const Vec v = load(seen + j);
         const Vec colour = linear_light(limited(v + 0.5f, 0, 1));
         store(seen + j, chosen(of_density, limited(v, -most, most), colour));
+    }
+}
+
+void light_backward(const float* seen, float* gradient, int points, float most) {
+    const Ints of_density = lanes_of_density();
+    for (int j = 0; j < points * SHOWN; j += LANES) {
+        const Vec v = load(seen + j), srgb = v + 0.5f;
+        const Vec steep = linear_light(limited(srgb, 0, 1)) / (srgb + 0.055f) * 2.4f;
+        const Vec slope = chosen(srgb <= 0.04045f, Vec{} + 1 / 12.92f, steep);
+        const Ints within = (of_density & (v >= -most) & (v <= most)) |
+                            (~of_density & (srgb >= 0.0f) & (srgb <= 1.0f));
+        const Vec g = load(gradient + j) * chosen(of_density, Vec{} + 1.0f, slope);
+        store(gradient + j, chosen(within, g, Vec{}));
     }
 }
 
@@ -249,6 +267,7 @@ void backward(const Decoder& d, const float* packed, const Points& points, const
 
 }  // namespace
 
-extern const DecodeKernel decode_kernel = {NAME(VNCA_TARGET), sizes, pack, forward, light, backward};
+extern const DecodeKernel decode_kernel = {NAME(VNCA_TARGET), sizes, pack, forward,
+                                            light, light_backward, backward};
 
 }  // namespace vnca::VNCA_TARGET

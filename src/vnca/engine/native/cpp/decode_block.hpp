@@ -53,6 +53,9 @@ struct DecodeKernel {
     // Makes of what is seen at points, whole vectors of it, linear light and Δd from −most to most.
     void (*light)(float* seen, int points, float most);
 
+    // Makes of the gradient of that the gradient of what is seen, which is as it was before.
+    void (*light_backward)(const float* seen, float* gradient, int points, float most);
+
     // Adds to `weights` the gradients of each layer's [weights | bias]ᵀ, and to `state` (rows given
     // by the slots) that of the cells around the points.
     void (*backward)(const Decoder&, const float* packed, const Points&, const float* gradient,
