@@ -77,10 +77,13 @@ class Samples:
 
     @torch.no_grad()
     def seen(self, extinction: float) -> "Samples":
-        """Without what is hidden, if density one takes at least so much in a step."""
+        """Without what is hidden, if density one takes at least so much in a step.
+
+        Nor with what is on the very border of the smoke, or by rounding beyond it.
+        """
         least = self._table(self.density[:, None])[..., 0] * extinction
         reached = running_sum(least) - least
-        seen = (reached < -math.log(UNSEEN))[self.row, self.column]
+        seen = (reached < -math.log(UNSEEN))[self.row, self.column] & (self.density > 0)
         some = (self.points[seen], self.density[seen], self.ray, self.row[seen], self.column[seen])
         return Samples(*some, self.depth)
 
@@ -100,7 +103,7 @@ def samples_along(
     offset: float | Tensor,
     extinction: float,
 ) -> Iterator[Samples]:
-    """Find the samples with smoke within a cell of them, for a group of rays at a time.
+    """Find the samples in smoke, for a group of rays at a time.
 
     Samples lie at depths (k + offset) · step for whole k, wherever the smoke begins: what is
     skipped never moves what is kept. Leaving out samples of zero density changes nothing, as

@@ -67,7 +67,7 @@ class Marcher:
         extinction: float,
         most: float,
     ) -> Seen | None:
-        """Samples at depths (k + offset) · step for whole k, with smoke within a cell of them.
+        """Samples at depths (k + offset) · step for whole k, where there is smoke.
 
         Args:
             origins: `[rays, 3]`, cell coordinates.

@@ -142,6 +142,7 @@ public:
             std::int64_t cell[3];
             if (!find(origin, direction, depth, point, cell) || !density_.near(cell)) continue;
             const float here = density_.at(cell, point);
+            if (!(here > 0)) continue;  // on the very border of the smoke, or by rounding beyond it
             to.points.insert(to.points.end(), point, point + 3);
             to.depth.push_back(depth);
             to.density.push_back(here);
