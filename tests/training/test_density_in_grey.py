@@ -14,7 +14,8 @@ from vnca.losses import luma
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
 from vnca.rule import DENSITY_CHANGE, Rule, RuleConfig
 from vnca.training.config import SmokeConfig, ViewConfig
-from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
+from vnca.training.scenes.framing import SmokeViewpoint
+from vnca.training.scenes.smoke import SmokeScene
 from vnca.training.trainers import choose_scales, smoke_trainer
 
 GREY = torch.tensor([0.2, 0.3, 0.1])

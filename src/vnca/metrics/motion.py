@@ -26,7 +26,8 @@ from vnca.rendering.colour import linear_to_srgb
 from vnca.rendering.march import sample
 from vnca.rule import COLOUR, Rule
 from vnca.training.config import ViewConfig
-from vnca.training.scenes.smoke import SmokeScene, SmokeViewpoint
+from vnca.training.scenes.framing import SmokeViewpoint
+from vnca.training.scenes.smoke import SmokeScene
 
 Estimator: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
 """Grey pictures `[row, column]` before and after, as displayed (sRGB, 0–1), to pixels moved,

@@ -163,6 +163,9 @@ class ViewConfig:
     so that typical smoke is as bright as its colour."""
     gamma: float | None = None
     """Extinction of density 1, per cell; chosen from the frame unless given."""
+    thinnest: float = 1.0
+    """The least part of that gamma with which smoke is seen in training, for a pattern to show in
+    translucent smoke: half of the views draw one between it and 1, evenly in proportion."""
 
     def __post_init__(self) -> None:
         if self.size < 32:
@@ -185,6 +188,8 @@ class ViewConfig:
             raise OptionError(f"`view.cell_opacity` {self.cell_opacity}: must be between 0 and 1")
         if self.gamma is not None and not 0 < self.gamma < inf:
             raise OptionError(f"`view.gamma` {self.gamma}: must be positive")
+        if not 0 < self.thinnest <= 1:
+            raise OptionError(f"`view.thinnest` {self.thinnest}: must be above 0, at most 1")
 
 
 @dataclass(frozen=True)

@@ -112,6 +112,30 @@ def test_cells_live_near_the_smoke_or_in_its_whole_box(tiny_smoke: Volume) -> No
     torch.testing.assert_close(*seen)
 
 
+def test_half_of_the_views_see_thinner_smoke_where_asked(tiny_smoke: Volume) -> None:
+    there = scene(tiny_smoke, ViewConfig(size=32, thinnest=0.1), gamma=2.0)
+    random = np.random.default_rng(0)
+    drawn = np.array([there.viewpoint(random).thinness for _ in range(400)])
+    thin = drawn[drawn < 1]
+    assert 160 < len(thin) < 240
+    assert 0.1 <= thin.min() < 0.12
+    # As many below the geometric middle as above it.
+    assert 0.4 < (thin < np.sqrt(0.1)).mean() < 0.6
+    always = scene(tiny_smoke, gamma=2.0)
+    assert {always.viewpoint(random).thinness for _ in range(20)} == {1.0}
+
+
+def test_thinner_smoke_is_as_with_a_smaller_gamma(tiny_smoke: Volume) -> None:
+    there, thin = scene(tiny_smoke, gamma=2.0), scene(tiny_smoke, gamma=0.2)
+    state, background = there.seed(4), torch.zeros(3)
+    view = there.viewpoint(np.random.default_rng(0))
+    seen = there.pictures(state, view._replace(thinness=0.1), background)
+    expected = thin.pictures(state, view._replace(thinness=1.0), background)
+    for ours, theirs in zip(seen, expected, strict=True):
+        torch.testing.assert_close(ours, theirs)
+    assert float(seen[1].mean()) < 0.7 * float(there.pictures(state, view, background)[1].mean())
+
+
 def lying(smoke: Volume, way: int) -> Volume:
     """The same smoke of the world, with index axes exchanged and mirrored."""
     order = [(2, 0, 1), (1, 0, 2)][way]

@@ -2,17 +2,15 @@
 
 import copy
 import dataclasses
-from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 import torch
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from vnca.core import AnyArray, Box, FloatArray
-from vnca.core.camera import Camera, Orthographic, Perspective, frame_box, turntable, world_box
+from vnca.core import Box, FloatArray
+from vnca.core.camera import Camera, Orthographic, Perspective, frame_box
 from vnca.core.errors import GridError
 from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
@@ -25,6 +23,13 @@ from vnca.rule.conditioning import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
 from vnca.rule.conditioning import normalised_velocity, priors
 from vnca.training.config import ViewConfig
 from vnca.training.scenes import Scene, as_light, colours, density_factors
+from vnca.training.scenes.framing import (
+    SmokeViewpoint,
+    around,
+    level_turntable,
+    stood,
+    view_width,
+)
 
 SPEEDS = (0.25, 1.5)
 """How much slower or faster than in the frame augmented smoke moves, at most."""
@@ -32,26 +37,14 @@ STRONGEST = 1.5
 """The greatest velocity that is added to all of the smoke, in units of its typical speed."""
 DENSEST = 2.0
 """How much denser, or thinner, the density is that the rule is conditioned on, at most."""
+THIN = 0.5
+"""Share of the views that see smoke thinner than it is, if any do."""
 PREVIEW_VIEWS = ((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (30.0, 60.0))
 """Azimuth and elevation: front, right, back and from above, degrees."""
 PREVIEW_STEP = 0.5
 """Distance between samples along a ray, cells: finer than in training, without terraces."""
 PREVIEW_BACKGROUND = 0.01
 """Linear grey behind the smoke."""
-_UPRIGHT = 1e-6
-"""Cells turned and stretched by less than this are upright cubes."""
-
-
-class SmokeViewpoint(NamedTuple):
-    """Where smoke is looked at from.
-
-    Attributes:
-        camera: The camera.
-        offset: Shift of all samples along their rays, in steps.
-    """
-
-    camera: Camera
-    offset: float
 
 
 class SmokeScene(Scene[SmokeViewpoint]):
@@ -114,7 +107,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
             decoder=rule.decoder,
             backend=backend,
         )
-        self._place = _stood(smoke.index_to_world)
+        self._place = stood(smoke.index_to_world)
         self.samples = max(domain.box.shape) / view.step * self._supersampling**2
         self.gamma = rule.scales.gamma
         self._grey_gamma = self.gamma
@@ -184,19 +177,22 @@ class SmokeScene(Scene[SmokeViewpoint]):
     @property
     def _corners(self) -> tuple[list[float], list[float]]:
         lower, upper = (np.asarray(c) - self.domain.box.lower - 0.5 for c in self.box)
-        return _around(lower, upper, self._place)
+        return around(lower, upper, self._place)
 
     def viewpoint(self, random: np.random.Generator) -> SmokeViewpoint:
         """A camera around the smoke, and where along the rays sampling begins."""
         azimuths = self.view.azimuths
         azimuth = float(random.choice(azimuths)) if azimuths else random.uniform(0, 360)
         elevation = random.uniform(-self.view.elevation, self.view.elevation)
-        camera = _level_turntable(*self._corners, azimuth, elevation)
+        camera = level_turntable(*self._corners, azimuth, elevation)
         if self.width < camera.height:
             camera = self._closer(camera, random)
         # Samples at random depths: no pattern can hide between them.
         offset = float(random.uniform()) if self.view.mode == "emission-absorption" else 0.0
-        return SmokeViewpoint(camera, offset)
+        thinness = 1.0
+        if self.view.thinnest < 1 and random.uniform() < THIN:
+            thinness = float(self.view.thinnest ** random.uniform())
+        return SmokeViewpoint(camera, offset, thinness)
 
     def _closer(self, camera: Orthographic, random: np.random.Generator) -> Orthographic:
         """The camera before some cell of the smoke, so near that it sees `width` cells."""
@@ -210,7 +206,9 @@ class SmokeScene(Scene[SmokeViewpoint]):
         self, state: Tensor, viewpoint: SmokeViewpoint, background: Tensor
     ) -> tuple[Tensor, Tensor]:
         """A view, as `Scene.pictures` has it."""
-        view = self.look(state, viewpoint.camera, offset=viewpoint.offset)
+        view = self.look(
+            state, viewpoint.camera, offset=viewpoint.offset, thinness=viewpoint.thinness
+        )
         picture = linear_to_srgb(view.over(background))
         return picture.permute(2, 0, 1)[None], view.opacity[None]
 
@@ -223,7 +221,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
             viewpoint.camera,
             rows=self.view.size,
             columns=self.view.size,
-            gamma=self.gamma,
+            gamma=self.gamma * viewpoint.thinness,
             step=self.view.step,
             offset=viewpoint.offset,
             cells_to_world=self._place,
@@ -246,7 +244,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
             viewpoint.camera,
             rows=self.view.size,
             columns=self.view.size,
-            gamma=self._grey_gamma,
+            gamma=self._grey_gamma * viewpoint.thinness,
             offset=viewpoint.offset,
             mode="paper",
             cells_to_world=self._place,
@@ -267,11 +265,18 @@ class SmokeScene(Scene[SmokeViewpoint]):
         return pictures
 
     def look(
-        self, state: Tensor, camera: Camera, view: ViewConfig | None = None, *, offset: float = 0.0
+        self,
+        state: Tensor,
+        camera: Camera,
+        view: ViewConfig | None = None,
+        *,
+        offset: float = 0.0,
+        thinness: float = 1.0,
     ) -> View:
         """The smoke as `state` paints it; differentiable in the state.
 
-        `view` is that of training unless given; `offset` shifts all samples along their rays.
+        `view` is that of training unless given; `offset` shifts all samples along their rays, and
+        `thinness` is what gamma is multiplied by.
         """
         view = view or self.view
         return render(
@@ -279,7 +284,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
             camera,
             rows=view.size,
             columns=view.size,
-            gamma=self.gamma,
+            gamma=self.gamma * thinness,
             step=view.step,
             offset=offset,
             mode=view.mode,
@@ -321,7 +326,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
             viewpoint.camera,
             rows=size,
             columns=size,
-            gamma=self.gamma,
+            gamma=self.gamma * viewpoint.thinness,
             step=self.view.step,
             offset=viewpoint.offset,
             mode=self.view.mode,
@@ -338,41 +343,6 @@ class SmokeScene(Scene[SmokeViewpoint]):
         if self.decoder is not None:
             cells = self.seen(state, self._centres)
         return density_factors(cells)
-
-
-def view_width(box: Box, index_to_world: AnyArray) -> float:
-    """Cells across a view of training, the same from all sides: patterns keep their size."""
-    lower, upper = (np.asarray(corner) for corner in box)
-    return _level_turntable(*_around(lower, upper, _stood(index_to_world))).height
-
-
-def _stood(index_to_world: AnyArray) -> AnyArray | None:
-    """4×4, how cells stand in the world and what shape they have there, in lengths of a cell.
-
-    None for upright cubes, which need not be turned.
-    """
-    linear = index_to_world[:3, :3] / np.cbrt(abs(np.linalg.det(index_to_world[:3, :3])))
-    if np.allclose(linear, np.eye(3), rtol=0, atol=_UPRIGHT):
-        return None
-    place = np.eye(4)
-    place[:3, :3] = linear
-    return place
-
-
-def _around(
-    lower: AnyArray, upper: AnyArray, place: AnyArray | None
-) -> tuple[list[float], list[float]]:
-    """The box around cells, where cameras are."""
-    if place is not None:
-        lower, upper = world_box(lower, upper, place)
-    return lower.tolist(), upper.tolist()
-
-
-def _level_turntable(
-    lower: Sequence[float], upper: Sequence[float], azimuth: float = 0.0, elevation: float = 0.0
-) -> Orthographic:
-    """As near as level views allow: those from above or below may cut off corners of the box."""
-    return turntable(lower, upper, azimuth, elevation, steepest=0)
 
 
 def smoke_bounds(smoke: Volume, density_scale: float) -> Box:
