@@ -37,9 +37,9 @@ from vnca.features.flow import FlowNetwork
 from vnca.io import SmokeFormat, read_smoke
 from vnca.io.picture import read_image
 from vnca.metrics.motion import Estimator, dis, estimator_of, farneback
-from vnca.rendering import projected_velocity, render
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
 from vnca.rendering.march import sample
+from vnca.rendering.view import projected_velocity, render
 from vnca.training.config import SmokeConfig
 from vnca.training.scenes.smoke import smoke_bounds
 from vnca.training.trainers import choose_scales

@@ -109,7 +109,7 @@ def _seen(roll: Roll, painting: Painting, bounds: Bounds) -> FloatArray:
         painting.colour,
         roll.rule.scales.extinction(painting.smoke.cell_length),
     )
-    image = picture(shown, VIEW, bounds=bounds, turned=0.0).over(behind(VIEW)).numpy()
+    image = picture(shown, VIEW, bounds=bounds, turned=0.0).over(behind(VIEW))
     return np.clip(image, 0, 1) ** (1 / 2.2)
 
 

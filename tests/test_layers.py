@@ -24,12 +24,11 @@ RANKS = {
     "cli": 10, "__main__": 11,
 }  # fmt: skip
 WITHOUT_TORCH = {"core", "ranks", "rule", "io", "simulation", "direction", "painting"}
-BACKENDS_WITH_TORCH = (
-    "tensors.py",
-    "reference/",
-    "triton/",
-    "native/autograd.py",
-)
+WITH_TORCH = {
+    "engine": ("tensors.py", "reference/", "triton/", "native/autograd.py"),
+    "rendering": ("view.py", "march.py", "native.py", "colour.py"),
+}
+"""In layers of which the rest is to be had without."""
 SOURCES = sorted(p for p in ROOT.rglob("*.py") if p != ROOT / "__init__.py")
 
 
@@ -65,9 +64,9 @@ def test_imports_go_downwards(path: Path) -> None:
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_core_layers_do_not_import_torch(path: Path) -> None:
-    where = path.relative_to(ROOT).as_posix().removeprefix("engine/")
-    torch_free_backend = layer(path) == "engine" and not where.startswith(BACKENDS_WITH_TORCH)
-    if layer(path) in WITHOUT_TORCH or torch_free_backend:
+    here = layer(path)
+    where = path.relative_to(ROOT).as_posix().removeprefix(f"{here}/")
+    if here in WITHOUT_TORCH or not where.startswith(WITH_TORCH.get(here, "")):
         assert not any(name.split(".")[0] == "torch" for name in imported_names(path))
 
 

@@ -38,7 +38,7 @@ def test_a_name_is_the_thing_itself() -> None:
     from vnca.core.volume import Volume
     from vnca.painting import stylize
     from vnca.recipe import stylizing
-    from vnca.rendering import render
+    from vnca.rendering.view import render
 
     assert vnca.Volume is Volume
     assert vnca.stylize is stylizing.stylize

@@ -19,8 +19,8 @@ from study import REFERENCE, Findings, Study, run
 from torch import Tensor
 
 from vnca.painting import Painting
-from vnca.rendering import Mode
 from vnca.rendering.colour import luminance
+from vnca.rendering.view import Mode
 from vnca.rule import Rule
 
 

@@ -15,8 +15,8 @@ from vnca.io.film import contact_sheet
 from vnca.io.picture import fit, read_image
 from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
 from vnca.painting import Painting, Roll, StylizeConfig
-from vnca.rendering import Mode, View, render
 from vnca.rendering.colour import linear_to_srgb
+from vnca.rendering.view import Mode, View, render
 from vnca.rule import Rule
 from vnca.training.scenes.smoke import PREVIEW_BACKGROUND, PREVIEW_STEP, PREVIEW_VIEWS, smoke_bounds
 

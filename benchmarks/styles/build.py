@@ -82,7 +82,7 @@ def thumbnail(model: Model, smoke: Path) -> bytes:
     bounds = region_bounds(shown.smoke.box, shown.smoke.index_to_world)
     film = FilmConfig(rows=2 * SIZE, columns=2 * SIZE, elevation=10.0)
     view = picture(shown, film, bounds=bounds, turned=0.0)
-    seen = resize(view.over([0.01] * 3).numpy(), SIZE, SIZE)
+    seen = resize(view.over([0.01] * 3), SIZE, SIZE)
     stream = io.BytesIO()
     Image.fromarray(to_srgb8(np.clip(seen, 0, 1))).save(stream, "WEBP", quality=85)
     return stream.getvalue()

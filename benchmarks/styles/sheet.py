@@ -44,7 +44,7 @@ def seen(frame: vnca.PaintedFrame, azimuth: float, elevation: float) -> AnyArray
     film = FilmConfig(rows=SIZE, columns=SIZE, elevation=elevation)
     bounds = region_bounds(smoke.box, smoke.index_to_world)
     view = film_picture(frame.shown, film, bounds=bounds, turned=azimuth)
-    return view.over(behind(film)).numpy().clip(0, 1)
+    return view.over(behind(film)).clip(0, 1)
 
 
 def _squared(picture: AnyArray) -> AnyArray:

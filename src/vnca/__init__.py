@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from vnca.recipe.smoke import train
     from vnca.recipe.stylizing import PaintedFrame, stylize
     from vnca.recipe.texture import texture
-    from vnca.rendering import View
-    from vnca.rendering import render as render_view
+    from vnca.rendering.view import View
+    from vnca.rendering.view import render as render_view
     from vnca.rule import Rule, RuleConfig, Scales
     from vnca.rule.conditioning import Conditioning, register_conditioning
     from vnca.rule.model import Model
@@ -88,7 +88,7 @@ _HOMES = {
     "StylizeConfig": "painting",
     "SmokeConfig": "training.config",
     "Trainer": "training.loop",
-    "View": "rendering",
+    "View": "rendering.view",
     "VncaError": "core.errors",
     "Volume": "core.volume",
     "find_frames": "io.sequence",
@@ -98,7 +98,7 @@ _HOMES = {
     "preset": "training.presets",
     "read_image": "io.picture",
     "read_smoke": "io",
-    "render_view": "rendering:render",
+    "render_view": "rendering.view:render",
     "simulate_smoke": "simulation:simulate",
     "smoke_box": "io",
     "smoke_trainer": "training.trainers",

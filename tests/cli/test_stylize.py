@@ -1,6 +1,3 @@
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -8,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.cli.bare import without_training
 
 from vnca.cli import main
 from vnca.cli.paint import Stylize
@@ -335,30 +333,6 @@ def test_the_scale_of_the_density_can_be_given(painted: Paint, smoke: Path, mode
     np.testing.assert_allclose(a, b, atol=1e-5)
 
 
-# What only training needs: nothing of it may be imported to apply a style.
-TRAINING_ONLY = ("torch", "scipy", "h5py", "av", "OpenEXR", "tensorboard", "jaxtyping")
-WITHOUT = f"""
-import sys
-class Without:
-    def __init__(self, finder):
-        self.finder = finder
-    def __getattr__(self, name):
-        return getattr(self.finder, name)
-    def find_spec(self, name, *where):
-        is_absent = name.partition(".")[0] in {TRAINING_ONLY} or name == ABSENT
-        return None if is_absent else self.finder.find_spec(name, *where)
-sys.meta_path[:] = map(Without, sys.meta_path)
-from vnca.cli import main
-sys.exit(main(sys.argv[1:]))
-"""
-
-
-def without_training(*arguments: object, absent: str = "") -> subprocess.CompletedProcess[str]:
-    """Runs the command line where only the core dependencies are, and not the module `absent`."""
-    command = [sys.executable, "-c", f"ABSENT = {absent!r}{WITHOUT}", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, env=os.environ)
-
-
 def test_applying_a_style_needs_nothing_that_training_does(
     painted: Paint, model: Path, smoke: Path, tmp_path: Path
 ) -> None:
@@ -395,18 +369,24 @@ def test_a_blender_frame_and_mantaflow_npz_are_painted_without_training(
         assert (out / expected.name).read_bytes() == expected.read_bytes()
 
 
-def test_without_torch_all_is_painted_and_a_line_says_how_to_get_the_preview(
+def test_what_a_preview_cannot_be_made_with_is_told_and_all_else_is_painted(
     painted: Paint, model: Path, smoke: Path, tmp_path: Path
 ) -> None:
-    out, film = tmp_path / "bare", tmp_path / "film.mp4"
-    done = without_training("stylize", model, smoke, "--out", out, *QUICK, "--preview", film)
-    assert done.returncode == 0, done.stderr
-    (line,) = (line for line in done.stderr.splitlines() if "preview" in line)
-    assert "need torch: pip install 'vnca[train]'" in line
-    assert f"vnca render {out}" in line
-    assert "film:" not in done.stderr
-    assert sorted(p.name for p in out.iterdir()) == sorted(p.name for p in painted().iterdir())
-    assert not film.exists()
+    native = "vnca.engine.native._native"
+    for name, absent, told in (
+        ("film.mp4", "", "need PyAV: pip install 'vnca[train]'"),
+        ("film.gif", native, "need the native core or torch"),
+    ):
+        out, film = tmp_path / Path(name).suffix, tmp_path / name
+        options = (*QUICK, "--preview", film)
+        done = without_training("stylize", model, smoke, "--out", out, *options, absent=absent)
+        assert done.returncode == 0, done.stderr
+        (line,) = (line for line in done.stderr.splitlines() if "without a preview" in line)
+        assert told in line
+        assert f"vnca render {out}" in line
+        assert "film:" not in done.stderr
+        assert sorted(p.name for p in out.iterdir()) == sorted(p.name for p in painted().iterdir())
+        assert not film.exists()
 
 
 def test_without_torch_and_a_compiler_the_slow_step_runs_and_says_so_once(
@@ -425,7 +405,7 @@ def test_without_torch_and_a_compiler_the_slow_step_runs_and_says_so_once(
 def test_what_is_missing_is_named(smoke: Path, style: Path, tmp_path: Path) -> None:
     for arguments in (
         ["train", smoke / "ball_0001.vdb", style, "--out", tmp_path / "out"],
-        ["render", smoke, "--out", tmp_path / "out" / "film.gif"],
+        ["render", smoke, "--out", tmp_path / "out" / "film.mp4"],
         ["simulate", "plume", "--out", tmp_path / "out"],
     ):
         done = without_training(*arguments)
@@ -433,7 +413,7 @@ def test_what_is_missing_is_named(smoke: Path, style: Path, tmp_path: Path) -> N
         assert done.stderr.count("\n") == 1, done.stderr
         assert done.stderr.startswith("vnca: ")
         assert "vnca[train]" in done.stderr
-        assert not (tmp_path / "out").exists()
+        assert not [*(tmp_path / "out").rglob("*")]
 
 
 def test_smoke_is_read_as_it_was_for_training_unless_told_otherwise(

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "checks.hpp"
+#include "film.hpp"
 #include "march.hpp"
 
 using namespace vnca;
@@ -143,6 +144,61 @@ void threads_do_not_change_a_bit() {
     });
 }
 
+struct Seen {
+    std::vector<float> pixels, passes;
+    bool operator==(const Seen&) const = default;
+};
+
+Seen filmed(const Smoke& smoke, const std::vector<float>& colour, const Light* light, const Rays& rays,
+            int threads) {
+    Seen seen = {std::vector<float>(3 * rays.count), std::vector<float>(rays.count)};
+    film(smoke.density, colour.data(), light, rays, seen.pixels.data(), seen.passes.data(), threads);
+    return seen;
+}
+
+// Smoke of many colours, and a light of which half passes one unit of optical depth.
+struct Lit {
+    Smoke smoke;
+    std::vector<float> colour, depth, octaves = {1, std::log(2.0f)};
+    Light light;
+
+    Lit() : smoke(17, 23, 19, 0), colour(3 * 17 * 23 * 19), depth(6 * 7 * 5, 1.0f) {
+        smoke.make_random(5);
+        for (std::size_t i = 0; i < colour.size(); ++i) colour[i] = 0.5f + 0.5f * std::sin(float(i));
+        light = {depth.data(), {6, 7, 5}, {4, 4, 4}, {4, 4, 4}, octaves.data(), 1, 0.25f, 0.5f};
+    }
+};
+
+void films_are_what_samples_add_up_to() {
+    Lit lit;
+    std::fill(lit.colour.begin(), lit.colour.end(), 0.5f);
+    Beams beams(lit.smoke, 500, 6);
+    // Within all of the light's cells even smoke is lit evenly.
+    lit.depth.assign(20 * 20 * 20, 1.0f);
+    lit.light = {lit.depth.data(), {20, 20, 20}, {20, 20, 20}, {4, 4, 4}, lit.octaves.data(), 1, 0.25f, 0.5f};
+    const Seen glowing = filmed(lit.smoke, lit.colour, nullptr, beams.rays, 1);
+    const Seen seen = filmed(lit.smoke, lit.colour, &lit.light, beams.rays, 2);
+    const Sampled found = march(lit.smoke.density, beams.rays, 1);
+    const std::vector<float> grey(found.points.size(), 0.5f);
+    std::vector<float> colour(3 * 500), passes(500), depth(500);
+    composite({found.starts.data(), 500, found.density.data(), grey.data(), found.depth.data(), 1, false},
+              colour.data(), passes.data(), depth.data(), 1);
+    for (int ray = 0; ray < 500; ++ray) {
+        expect(std::abs(glowing.passes[ray] - passes[ray]) < 1e-6f, "films pass as much");
+        expect(std::abs(glowing.pixels[3 * ray] - colour[3 * ray]) < 1e-5f, "films glow the same");
+        expect(std::abs(seen.pixels[3 * ray] - 0.5f * glowing.pixels[3 * ray]) < 1e-5f,
+               "light is multiplied with colours");
+    }
+}
+
+void films_are_the_same_of_callers() {
+    const Lit lit;
+    const Beams beams(lit.smoke, 3000, 6);
+    expect_the_same_of_callers([&](int threads) {
+        return filmed(lit.smoke, lit.colour, &lit.light, beams.rays, threads);
+    });
+}
+
 void what_is_wrong_is_left_out() {
     Smoke smoke(3, 3, 3, 1.0f);
     const float odd[] = {std::numeric_limits<float>::quiet_NaN(),
@@ -158,6 +214,24 @@ void what_is_wrong_is_left_out() {
             for (const float at : found.points)
                 expect(at > -3 && at < 6, "samples lie in the smoke");
         }
+    Smoke thin(3, 3, 3, 1e-20f);
+    Beams still(thin, 300, 1);
+    for (int ray = 0; ray < 300; ++ray)
+        for (int axis = 0; axis < 3; ++axis) {
+            still.origins[3 * ray + axis] = 1;
+            still.directions[3 * ray + axis] = ray % 2 ? 0.0f : 1e-20f;
+        }
+    expect(march(thin.density, still.rays, 2).depth.empty(), "rays that stay end");
+    const Lit lit;
+    for (const float first : odd)
+        for (const float times : odd) {
+            Light light = lit.light;
+            light.first[1] = first;
+            light.times[2] = times;
+            const Beams beams(lit.smoke, 300, 1);
+            for (const float passes : filmed(lit.smoke, lit.colour, &light, beams.rays, 2).passes)
+                expect(passes >= 0 && passes <= 1, "a light from nowhere leaves smoke as it is");
+        }
     Smoke nothing(2, 3, 4, 0.0f);
     expect(nothing.bounds.least[0] > nothing.bounds.most[0], "there is no smoke");
     Smoke odd_values(2, 2, 2, std::numeric_limits<float>::quiet_NaN());
@@ -171,6 +245,8 @@ int main() {
     gradients_are_differences(false);
     gradients_are_differences(true);
     threads_do_not_change_a_bit();
+    films_are_what_samples_add_up_to();
+    films_are_the_same_of_callers();
     what_is_wrong_is_left_out();
     std::puts("marching: all hold");
 }

@@ -12,8 +12,9 @@ from vnca.core.camera import frame_box
 from vnca.core.errors import ShapeError
 from vnca.engine import native as core
 from vnca.engine.native import decoding, marching
-from vnca.rendering import Mode, march, native, render
+from vnca.rendering import march, native
 from vnca.rendering.light import Light, LightVolume
+from vnca.rendering.view import Mode, render
 from vnca.training.scenes import colours, density_factors
 
 pytestmark = pytest.mark.skipif(
@@ -38,6 +39,11 @@ def rays(density: Tensor, side: tuple[float, float]) -> tuple[Tensor, Tensor, Te
     return *(
         torch.from_numpy(a.astype(np.float32).reshape(-1, 3)) for a in (origins, directions)
     ), offsets
+
+
+def some_rays(count: int) -> marching.Rays:
+    points, offsets = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
+    return marching.Rays(points, points, offsets, near=0, step=1, extinction=1, most=1)
 
 
 def by_ray(found: list[march.Samples] | list[native.Samples]) -> dict[int, list[Tensor]]:
@@ -135,7 +141,9 @@ def test_pictures_and_gradients_are_the_same(
 ) -> None:
     given = smoke(3)
     camera = frame_box([-0.5] * 3, [n - 0.5 for n in given.shape], 20.0, 30.0)
-    light = LightVolume(given, Light(azimuth=10.0, elevation=50.0), gamma=1.5) if lit else None
+    light = None
+    if lit:
+        light = LightVolume(given.numpy(), Light(azimuth=10.0, elevation=50.0), gamma=1.5)
     results = []
     for natively in (True, False):
         if not natively:
@@ -166,7 +174,7 @@ def test_threads_do_not_change_a_bit() -> None:
     results = []
     for threads in (1, 2, 3):
         marcher = marching.Marcher(density.numpy(), threads)
-        seen = marcher.along(origins, directions, offsets, near=0, step=0.5, extinction=1, most=7)
+        seen = marcher.along(marching.Rays(origins, directions, offsets, 0, 0.5, 1, 7))
         assert seen is not None
         colour = np.sin(seen.points)
         shading = marching.Shading(seen.starts, seen.density, colour, seen.depth, 0.7, False)
@@ -182,8 +190,7 @@ def test_nothing_is_found_without_smoke() -> None:
     density = torch.zeros(3, 4, 5)
     asked = (density, torch.zeros(1, 3), torch.ones(1, 3))
     assert list(native.samples_along(*asked, offset=0.0, **HOW)) == []
-    assert marching.Marcher(density.numpy()).along(*(np.zeros((1, 3), np.float32),) * 2,
-        np.zeros(1, np.float32), near=0, step=1, extinction=1, most=1) is None  # fmt: skip
+    assert marching.Marcher(density.numpy()).along(some_rays(1)) is None
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e30])
@@ -199,16 +206,16 @@ def test_rays_that_lead_nowhere_find_nothing(value: float) -> None:
 def wrong(change: str) -> Callable[[], object]:
     """A call with an array that does not fit."""
     marcher = marching.Marcher(np.ones((2, 2, 2), np.float32))
-    points, offsets = np.zeros((4, 3), np.float32), np.zeros(4, np.float32)
-    how = {"near": 0, "step": 1, "extinction": 1, "most": 1}
+    rays = some_rays(4)
+    points, offsets = rays.origins, rays.offsets
     starts, depth = np.array([0, 2, 4]), np.zeros(4, np.float32)
     shading = marching.Shading(starts, depth, points, depth, 1.0, False)
     calls = {
         "density": lambda: marching.Marcher(np.ones((2, 2), np.float32)),
         "type": lambda: marching.Marcher(np.ones((2, 2, 2))),
-        "rays": lambda: marcher.along(points, points[:3], offsets, **how),
-        "offsets": lambda: marcher.along(points, points, offsets[:3], **how),
-        "step": lambda: marcher.along(points, points, offsets, **{**how, "step": 0}),
+        "rays": lambda: marcher.along(rays._replace(directions=points[:3])),
+        "offsets": lambda: marcher.along(rays._replace(offsets=offsets[:3])),
+        "step": lambda: marcher.along(rays._replace(step=0)),
         "starts": lambda: marching.composite(shading._replace(starts=np.array([0, 5, 4]))),
         "end": lambda: marching.composite(shading._replace(starts=np.array([0, 2, 5]))),
         "colour": lambda: marching.composite(shading._replace(colour=points[:3])),

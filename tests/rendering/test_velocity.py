@@ -5,7 +5,7 @@ from torch.nn import functional
 
 from vnca.core.camera import Orthographic, Perspective, frame_box
 from vnca.core.errors import ShapeError
-from vnca.rendering import projected_velocity, render
+from vnca.rendering.view import projected_velocity, render
 
 SHAPE = (20, 20, 20)
 

@@ -7,8 +7,8 @@ import torch
 
 from vnca.core.camera import Orthographic, Perspective, frame_box
 from vnca.core.errors import OptionError, ShapeError
-from vnca.rendering import render
 from vnca.rendering.march import sample
+from vnca.rendering.view import render
 
 ABOVE = (0, 90)
 

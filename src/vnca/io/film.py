@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from fractions import Fraction
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
@@ -217,6 +218,11 @@ class _WebP(_Gif):
 
 _ENCODERS = {".mp4": _Mp4, ".gif": _Gif, ".webp": _WebP}
 SUFFIXES = tuple(_ENCODERS)
+
+
+def usual_suffix() -> str:
+    """That of a film nobody named: `.mp4` where PyAV is installed, else `.webp`."""
+    return ".mp4" if find_spec("av") else ".webp"
 
 
 def _durations(count: int, fps: Fraction, *, unit: int) -> list[int]:

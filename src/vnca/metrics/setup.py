@@ -13,7 +13,7 @@ from vnca.core.camera import Orthographic, turntable
 from vnca.core.errors import GridError
 from vnca.core.volume import Volume
 from vnca.painting import Painting
-from vnca.rendering import projected_velocity, render
+from vnca.rendering.view import projected_velocity, render
 from vnca.rule import SMOKE_THRESHOLD, Rule
 from vnca.training.scenes.smoke import smoke_bounds
 

@@ -1,26 +1,22 @@
-"""Filming painted frames as they come; torch is needed once there is something to film."""
+"""Filming painted frames as they come."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from vnca.core import AnyArray, FloatArray
 from vnca.core.camera import Shot, frame_box, parse_colour
 from vnca.core.colour import linear_to_srgb, srgb_to_linear
-from vnca.core.errors import BackendUnavailableError, OptionError
+from vnca.core.errors import OptionError
 from vnca.core.volume import Volume
 from vnca.io.film import FilmWriter
-
-if TYPE_CHECKING:
-    import torch
-
-    from vnca.rendering import View
-
+from vnca.rendering.film import Picture, render, require_renderer
+from vnca.rendering.light import Light, LightVolume, spacing_for
 
 _RAISED, _LOWERED = 0.8, 0.4
 # Interleaved gradient noise: neighbouring pixels are spread evenly over a step.
@@ -126,7 +122,7 @@ class Film:
         bounds: Bounds,
         *,
         frames: int,
-        device: "torch.device | str" = "cpu",
+        device: str = "cpu",
     ) -> None:
         """Open the film; it appears under its name when the context ends well.
 
@@ -142,12 +138,7 @@ class Film:
             OptionError: If the path is no film, or the frame rate cannot work.
             OutputError: If the film cannot be written.
         """
-        try:
-            import vnca.rendering  # noqa: F401  A missing torch is reported before long work.
-        except ModuleNotFoundError as error:
-            raise BackendUnavailableError(
-                f"films need {error.name}: pip install 'vnca[train]'"
-            ) from error
+        require_renderer(device)  # what is missing is reported before long work
         self._config, self._bounds, self._frames, self._device = config, bounds, frames, device
         self._writer = FilmWriter(path, fps=config.fps)
         self._background = behind(config)
@@ -176,7 +167,7 @@ class Film:
             turned=self._config.turn * self._shown / self._frames,
             device=self._device,
         )
-        self._writer.add(view.over(self._background).cpu().numpy())
+        self._writer.add(view.over(self._background))
         self._shown += 1
 
 
@@ -194,14 +185,9 @@ def picture(
     *,
     bounds: Bounds,
     turned: float,
-    device: "torch.device | str" = "cpu",
-) -> "View":
+    device: str = "cpu",
+) -> Picture:
     """The view of one frame by a camera framed on `bounds` that has turned by some degrees."""
-    import torch
-
-    from vnca.rendering import render
-    from vnca.rendering.light import Light, LightVolume, spacing_for
-
     density, colour, place = frame.smoke.density, frame.colour, frame.smoke.cells_to_world
     # In lengths of a cell, single precision has room for a world of any size.
     thinnest = _thinnest(place)
@@ -217,11 +203,11 @@ def picture(
     )
     if density.size == 0:
         density, colour = np.zeros((1, 1, 1), np.float32), np.zeros((1, 1, 1, 3), np.float32)
-    smoke, gamma = torch.from_numpy(density).to(device), frame.extinction * thinnest
+    gamma = frame.extinction * thinnest
     light = None
     if config.light:
         light = LightVolume(
-            smoke,
+            density,
             Light(
                 config.azimuth + config.light_azimuth,
                 config.light_elevation,
@@ -233,18 +219,18 @@ def picture(
             spacing=spacing_for(*bounds) / thinnest,
             origin=frame.smoke.origin,
         )
-    with torch.no_grad():
-        return render(
-            smoke,
-            torch.from_numpy(colour).to(device),
-            camera,
-            rows=config.rows,
-            columns=config.columns,
-            gamma=gamma,
-            step=config.step,
-            cells_to_world=place,
-            light=light,
-        )
+    return render(
+        density,
+        colour,
+        camera,
+        rows=config.rows,
+        columns=config.columns,
+        gamma=gamma,
+        step=config.step,
+        cells_to_world=place,
+        light=light,
+        device=device,
+    )
 
 
 def _thinnest(cells_to_world: AnyArray) -> float:

@@ -16,6 +16,7 @@ from vnca.direction import Direction
 from vnca.direction.shot import SUFFIX as SHOT
 from vnca.direction.shot import Shot
 from vnca.io import SmokeFormat
+from vnca.io.film import usual_suffix
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.painting import StylizeConfig
 from vnca.painting.chunk import Chunking
@@ -28,8 +29,8 @@ from vnca.rule.library import load_style, require_style
 from vnca.rule.model import MODEL_NAME, Model
 
 COMMAND = "paint"
-RUN, PAINTED, FILM = "run", "painted", "film.mp4"
-"""In the folder: the run of the training, the painted frames and the film of them."""
+RUN, PAINTED, FILM = "run", "painted", "film"
+"""In the folder: the run of the training, the painted frames and their film, without its suffix."""
 ASKED_NAME = "paint.json"
 """In the folder: what was asked for, to go on with nothing else."""
 MODEL_SUFFIX = ".safetensors"
@@ -50,7 +51,7 @@ class PaintRun:
     style: str | None = None
     """A style of the library in the place of a picture: it paints at once, without training."""
     out: Path
-    """Folder for all of it: run, painted and film.mp4."""
+    """Folder for all of it: run, painted and film.mp4; film.webp where PyAV is not installed."""
     preset: str = "draft"
     """How the rule is trained: draft, standard, paper, or a TOML file."""
     training_frame: int | None = None
@@ -277,7 +278,7 @@ def run(options: PaintRun, watch: Watch, ranks: Ranks | None = None) -> Iterator
         sequence=options.sequence,
         out=options.out / PAINTED,
         frames=options.frames,
-        preview=options.out / FILM if is_filmed else None,
+        preview=options.out / (FILM + usual_suffix()) if is_filmed else None,
         refine=options.refine,
         resume=goes_on,
         overwrite=options.overwrite,

@@ -282,8 +282,7 @@ def _pictures(shown: Iterator[Shown], bounds: Bounds, options: RenderRun) -> Non
 def _picture(frame: Shown, bounds: Bounds, options: RenderRun) -> FloatArray:
     device = device_named(options.device)
     view = picture(frame, options.film, bounds=bounds, turned=0.0, device=device)
-    image = view.rgba if options.transparent else view.over(behind(options.film))
-    return image.cpu().numpy()
+    return view.rgba if options.transparent else view.over(behind(options.film))
 
 
 def _numbered(path: Path, frame: int) -> Path:

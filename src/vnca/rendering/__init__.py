@@ -1,240 +1,51 @@
-"""What a camera sees of a volume: its picture and its motion.
+"""What a camera sees of smoke: on tensors, differentiable (`view.py`), or for films (`film.py`).
 
-The picture is differentiable in the density and colour of the volume.
+Here is what both have in common. It needs no torch, and neither do films where the native core is.
 """
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-import torch
-from jaxtyping import Float
-from torch import Tensor
 
 from vnca.core import AnyArray
 from vnca.core.camera import Camera
 from vnca.core.errors import OptionError, ShapeError
-from vnca.rendering import march, native
-from vnca.rendering.light import LightVolume
-from vnca.rendering.march import THINNEST, sample
 
-Mode = Literal["emission-absorption", "paper"]
-
-Shader = Callable[[Tensor], tuple[Tensor, Tensor]]
-"""What smoke is at points `[m, 3]` in cells: factors of its density `[m]`, at least
-`LEAST_FACTOR`, and linear RGB `[m, 3]`."""
-
-LEAST_FACTOR = 0.5
-"""The least that a shader may multiply density by."""
+UNSEEN = 5e-4
+"""What gets less light through than this is left out: an eighth of a step of 8-bit colour."""
+THINNEST = 1e-12
+"""Density this thin is invisible; below it nothing is divided by it."""
 # Where the samples of a pixel begin, in steps: each finer grid fills the gaps of the one before.
 _STAGGER = 0.618034
 
 
-@dataclass(frozen=True, eq=False)
-class View:
-    """What a camera sees.
-
-    Attributes:
-        colour: `[rows, columns, 3]`, linear RGB, premultiplied by opacity.
-        opacity: `[rows, columns]`, in [0, 1].
-        depth: `[rows, columns]`, mean depth along the ray of the smoke seen, in the camera's
-            lengths; infinite where there is none.
-    """
-
-    colour: Float[Tensor, "rows columns 3"]
-    opacity: Float[Tensor, "rows columns"]
-    depth: Float[Tensor, "rows columns"]
-
-    def over(
-        self, background: Tensor | AnyArray | Sequence[float]
-    ) -> Float[Tensor, "rows columns 3"]:
-        """The view in front of a linear RGB colour or picture `[..., 3]`. Differentiable."""
-        behind = torch.as_tensor(background, dtype=self.colour.dtype, device=self.colour.device)
-        return self.colour + (1 - self.opacity)[..., None] * behind
-
-    @property
-    def rgba(self) -> Float[Tensor, "rows columns 4"]:
-        """Premultiplied linear RGB and opacity."""
-        return torch.cat([self.colour, self.opacity[..., None]], -1)
-
-
-def render(
-    density: Float[Tensor, "x y z"],
-    colour: Float[Tensor, "x y z 3"] | Shader,
-    camera: Camera,
+def check_view(
+    density: tuple[int, ...],
+    colour: tuple[int, ...],
     *,
     rows: int,
     columns: int,
     gamma: float,
-    step: float = 1.0,
-    offset: float = 0.0,
-    mode: Mode = "emission-absorption",
-    cells_to_world: AnyArray | None = None,
-    supersampling: int = 1,
-    light: LightVolume | None = None,
-) -> View:
-    """Render smoke by emission and absorption.
-
-    Differentiable in `density` and `colour`, except for cells further than a cell from any
-    smoke, and for those that so much smoke hides that they could not be seen: rays are not
-    sampled there. The depth is not differentiable. Deterministic bit for bit on the CPU.
-
-    Colours of an array: density and density times colour are interpolated, and the colour of a
-    sample is their quotient: so what colour the empty cells around the smoke have is of no effect.
-    A shader says what is at each sample that can be seen, however fine; the density is then that
-    of the smoke before it is painted.
-
-    Lengths are those of the space the camera is in, whatever the shape of the cells: what a slab
-    of smoke absorbs depends on how thick it is there, not on how many cells it is divided into.
+    step: float,
+) -> None:
+    """Refuse what cannot be rendered.
 
     Args:
-        density: max(d (1 + Δd), 0), non-negative.
-        colour: Linear RGB, or a shader.
-        camera: Where to look from, in the space that `cells_to_world` leads to.
+        density: Its shape.
+        colour: Its shape.
         rows: Height of the picture, pixels.
         columns: Width of the picture, pixels.
         gamma: Extinction of density one, 1/length.
-        step: Length between samples along a ray; one in paper mode.
-        offset: Shift of all samples along their rays, in steps, in [0, 1). Training draws it.
-        mode: The integrand: "emission-absorption", or "paper" as the paper prints it.
-        cells_to_world: 4×4, affine and invertible, from cell coordinates of these arrays (cell
-            `[i, j, k]` at (i, j, k)) to where the camera is. The same unless given: lengths are
-            then in cells.
-        supersampling: Rays along the rows and the columns of a pixel, whose samples begin at
-            different depths; the view is their mean.
-        light: What lights the smoke; unless given it glows in its own colours. It passes no
-            gradients on.
+        step: Length between samples along a ray.
 
     Raises:
-        ShapeError: If density, colour and light do not cover the same cells.
+        ShapeError: If density and colour do not cover the same cells.
         OptionError: If an option is out of range.
     """
-    _check(density, colour, rows, columns, gamma, step, offset, mode)
-    if light is not None:
-        light.check(density)
-    along, offsets = supersampling, offset
-    if along > 1:
-        stagger = torch.arange(along**2, device=density.device) * _STAGGER
-        offsets = (density.new_tensor(offset) + stagger) % 1
-        offsets = offsets.view(along, along).repeat(rows, columns).view(-1)
-    view = _render(
-        density,
-        colour,
-        camera,
-        rows=along * rows,
-        columns=along * columns,
-        gamma=gamma,
-        step=step,
-        offset=offsets,
-        mode=mode,
-        cells_to_world=cells_to_world,
-        light=light,
-    )
-    return view if along == 1 else _averaged(view, rows, columns, along)
-
-
-def _averaged(view: View, rows: int, columns: int, along: int) -> View:
-    """A view of pixels of which each is the mean of `along` × `along` rays."""
-
-    def mean(values: Tensor) -> Tensor:
-        shape = (rows, along, columns, along, *values.shape[2:])
-        return values.view(shape).mean((1, 3))
-
-    opacity = mean(view.opacity)
-    depth = mean(torch.where(view.opacity > 0, view.depth * view.opacity, 0))
-    depth = torch.where(opacity > THINNEST, depth / opacity.clamp_min(THINNEST), math.inf)
-    return View(mean(view.colour), opacity, depth)
-
-
-def _render(
-    density: Tensor,
-    colour: Tensor | Shader,
-    camera: Camera,
-    *,
-    rows: int,
-    columns: int,
-    gamma: float,
-    step: float,
-    offset: float | Tensor,
-    mode: Mode,
-    cells_to_world: AnyArray | None,
-    light: LightVolume | None,
-) -> View:
-    """A ray through the middle of each pixel; `offset` of all, or of each of them."""
-    origins, directions = (
-        density.new_tensor(array).view(-1, 3)
-        for array in _through_cells(*camera.rays(rows, columns), cells_to_world)
-    )
-    field, least = density[..., None], LEAST_FACTOR
-    if isinstance(colour, Tensor):
-        field, least = torch.cat([field, field * colour], dim=-1), 1.0
-    pixels, colours, opacities, depths = [], [], [], []
-    for samples in (native if native.serves(density) else march).samples_along(
-        density,
-        origins,
-        directions,
-        near=camera.near,
-        step=step,
-        offset=offset,
-        extinction=gamma * step * least,
-    ):
-        if isinstance(colour, Tensor):
-            values = sample(field, samples.points)
-            dense = values[:, 0]
-            hue = values[:, 1:] / dense[:, None].clamp_min(THINNEST)
-        else:
-            factors, hue = colour(samples.points)
-            dense = samples.density * factors
-        if light is not None:
-            hue = hue * light.at(samples.points)[:, None]
-        seen, passes, depth = samples.light(
-            dense, hue, extinction=gamma * step, paper=mode == "paper"
-        )
-        pixels.append(samples.ray)
-        colours.append(seen)
-        opacities.append(1 - passes)
-        depths.append(depth)
-    return View(
-        _picture(pixels, colours, density.new_zeros(rows * columns, 3)).view(rows, columns, 3),
-        _picture(pixels, opacities, density.new_zeros(rows * columns)).view(rows, columns),
-        _picture(pixels, depths, density.new_full((rows * columns,), math.inf)).view(rows, columns),
-    )
-
-
-def _through_cells(
-    origins: AnyArray, directions: AnyArray, cells_to_world: AnyArray | None
-) -> tuple[AnyArray, AnyArray]:
-    """Rays `point = origin + depth · direction` of the world, in cells; depths stay as they are."""
-    if cells_to_world is None:
-        return origins, directions
-    to_cells = np.linalg.inv(cells_to_world[:3, :3])
-    return (origins - cells_to_world[:3, 3]) @ to_cells.T, directions @ to_cells.T
-
-
-def _picture(pixels: list[Tensor], values: list[Tensor], empty: Tensor) -> Tensor:
-    """`empty` with the values of the pixels that see smoke."""
-    if not pixels:
-        return empty
-    return empty.index_put((torch.cat(pixels),), torch.cat(values))
-
-
-def _check(
-    density: Tensor,
-    colour: Tensor | Shader,
-    rows: int,
-    columns: int,
-    gamma: float,
-    step: float,
-    offset: float,
-    mode: str,
-) -> None:
-    shape = colour.shape if isinstance(colour, Tensor) else (*density.shape, 3)
-    if density.ndim != 3 or shape != (*density.shape, 3):
+    if len(density) != 3 or colour != (*density, 3):
         raise ShapeError(
             "volume to render: expected density [x, y, z] and colour [x, y, z, 3], "
-            f"got {tuple(density.shape)} and {tuple(shape)}"
+            f"got {density} and {colour}"
         )
     if min(rows, columns) < 1:
         raise OptionError(f"picture size: expected at least 1×1 pixels, got {columns}×{rows}")
@@ -242,82 +53,43 @@ def _check(
         raise OptionError(f"gamma: expected 0 or more, got {gamma}")
     if not step > 0:
         raise OptionError(f"step: expected more than 0, got {step}")
-    if not 0 <= offset < 1:
-        raise OptionError(f"offset: expected 0 to less than 1, got {offset}")
-    if mode not in ("emission-absorption", "paper"):
-        raise OptionError(f"mode: expected emission-absorption or paper, got {mode}")
-    if mode == "paper" and step != 1:
-        raise OptionError(f"step: the paper's integrand is defined for a step of 1, got {step}")
 
 
-@torch.no_grad()
-def projected_velocity(
-    density: Float[Tensor, "x y z"],
-    velocity: Float[Tensor, "x y z 3"],
-    camera: Camera,
-    *,
-    rows: int,
-    columns: int,
-    cells_to_world: AnyArray | None = None,
-    **marching: Any,
-) -> tuple[Float[Tensor, "rows columns 2"], Float[Tensor, "rows columns"]]:
-    """What moves in each pixel of a view, and how opaque the pixel is.
-
-    Each cell moves by some pixels in a frame. The camera sees these movements as it sees
-    colours: the mean along a ray, weighted by how much every sample contributes to the picture.
+def rays_in_cells(
+    camera: Camera, rows: int, columns: int, cells_to_world: AnyArray | None
+) -> tuple[AnyArray, AnyArray]:
+    """Rays `point = origin + depth · direction` through the middles of pixels, in cells.
 
     Args:
-        density: max(d (1 + Δd), 0), non-negative.
-        velocity: Cells per frame.
         camera: Where to look from, in the space that `cells_to_world` leads to.
         rows: Height of the picture, pixels.
         columns: Width of the picture, pixels.
-        cells_to_world: Where the camera is, see `render`.
-        **marching: `gamma`, `step`, `offset` and `mode` of `render`.
+        cells_to_world: 4×4, affine and invertible; the same unless given.
 
     Returns:
-        Pixels per frame, to the right and down, zero where nothing is seen; and the opacity.
-
-    Raises:
-        ShapeError: If density and velocity do not cover the same cells.
-        OptionError: If an option is out of range.
-
-    Reference: VNCA section 3.4, J^ψ.
+        Origins and directions `[rays, 3]`, row by row; depths are those of the camera's space.
     """
-    if velocity.shape != (*density.shape, 3):
-        raise ShapeError(
-            "velocity to project: expected [x, y, z, 3] for a density of "
-            f"{tuple(density.shape)}, got {tuple(velocity.shape)}"
-        )
-    smoke = torch.nonzero(density > 0)
-    there = tuple(smoke.T)
-    moved = density.new_zeros(*density.shape, 3)
-    place = np.eye(4) if cells_to_world is None else cells_to_world
-    moved[there] = _pixels(smoke, velocity[there], camera, rows, columns, place)
-    size: dict[str, Any] = {"rows": rows, "columns": columns}
-    view = render(density, moved, camera, **size, cells_to_world=cells_to_world, **marching)
-    weight = view.colour[..., 2:]
-    return view.colour[..., :2] / weight.clamp_min(1e-6), view.opacity
+    origins, directions = (array.reshape(-1, 3) for array in camera.rays(rows, columns))
+    if cells_to_world is None:
+        return origins, directions
+    to_cells = np.linalg.inv(cells_to_world[:3, :3])
+    return (origins - cells_to_world[:3, 3]) @ to_cells.T, directions @ to_cells.T
 
 
-def _pixels(
-    cells: Tensor,
-    velocity: Tensor,
-    camera: Camera,
-    rows: int,
-    columns: int,
-    cells_to_world: AnyArray,
-) -> Float[Tensor, "n 3"]:
-    """How far cells move in the picture in a frame: right, down, and a one.
+def staggered(offset: float, along: int, rows: int, columns: int) -> AnyArray:
+    """Where the samples of `along` × `along` rays of each pixel begin, in steps, row by row."""
+    of_pixel = (offset + _STAGGER * np.arange(along**2)).reshape(along, along) % 1
+    return np.tile(of_pixel, (rows, columns)).ravel()
 
-    A camera sees the one as the sum of the weights of a ray, which makes the others a mean.
+
+def averaged(values: Any, rows: int, columns: int, along: int) -> Any:
+    """Means over `along` × `along` rays of each pixel, `[rows, columns, …]`.
+
+    Args:
+        values: An array or tensor `[rays, …]`.
+        rows: Height of the picture, pixels.
+        columns: Width of the picture, pixels.
+        along: Rays along the rows and the columns of a pixel.
     """
-    start = cells.cpu().numpy().astype(np.float64)
-    end = start + velocity.cpu().numpy()
-    linear, translation = cells_to_world[:3, :3], cells_to_world[:3, 3]
-    (row, column, _), (row_after, column_after, _) = (
-        camera.project(points @ linear.T + translation, rows, columns) for points in (start, end)
-    )
-    moved = np.stack([column_after - column, row_after - row, np.ones(len(start))], axis=-1)
-    # Behind a pinhole there is no picture.
-    return torch.from_numpy(np.nan_to_num(moved)).to(velocity)
+    shape = (rows, along, columns, along, *values.shape[1:])
+    return values.reshape(shape).mean((1, 3))

@@ -1,7 +1,7 @@
 """A key light that shines through smoke, and the shadows that the smoke throws on itself.
 
-How much smoke lies between a cell and the light is found once for all cells, so that a view looks
-it up at its samples: README.md. Nothing here is differentiated.
+How much smoke lies between a cell and the light is found once for all cells, in numpy, so that a
+view looks it up at its samples: README.md. Nothing here is differentiated.
 """
 
 from collections.abc import Sequence
@@ -9,24 +9,25 @@ from dataclasses import dataclass
 from math import floor, isfinite
 
 import numpy as np
-import torch
-from jaxtyping import Float
-from torch import Tensor
-from torch.nn import functional
 
-from vnca.core import AnyArray
+from vnca.core import AnyArray, FloatArray
 from vnca.core.camera import view_axes
 from vnca.core.errors import OptionError, ShapeError
-from vnca.rendering.march import sample
+from vnca.engine.native.marching import Shade
 
 FINEST = 96
 """Cells of a light volume along the longest side of what is lit: shadows are soft."""
 
 OCTAVES = ((0.5, 1.0), (0.3, 1 / 4), (0.2, 1 / 16))
 """Weights, which add up to one, and parts of the extinction that light scattered ever more often
-meets."""
+meets.
 
+Reference: Wrenninge, Kulla & Lundqvist 2013.
+"""
+
+# Of what faces a light that would be 1 (README.md).
 _FACING = sum(weight / (1 + part) for weight, part in OCTAVES)
+_OCTAVES = np.array([(weight / _FACING, part) for weight, part in OCTAVES], np.float32)
 
 
 @dataclass(frozen=True)
@@ -59,35 +60,29 @@ class Light:
         """The unit vector towards it."""
         return -view_axes(self.azimuth, self.elevation)[2]
 
-    def factor(self, depth: Tensor) -> Tensor:
-        """What a colour is multiplied by behind so much smoke, an optical depth of any shape.
+    @property
+    def base(self) -> float:
+        """What a colour is multiplied by, however much smoke is in the way."""
+        return max(1 - self.strength, 0.0) + self.strength * self.ambient
 
-        1 in front of all smoke, at a strength of at most 1; never more than at an optical depth
-        of 0.
-
-        Reference: Wrenninge, Kulla & Lundqvist 2013: light scattered many times as a sum over
-        octaves, each of them weaker and less absorbed.
-        """
-        direct = torch.zeros_like(depth)
-        for weight, part in OCTAVES:
-            direct += weight * torch.exp(-part * depth)
-        direct = (direct / _FACING).clamp_max(1)
-        glow = max(1 - self.strength, 0.0)
-        return glow + self.strength * (self.ambient + (1 - self.ambient) * direct)
+    @property
+    def gain(self) -> float:
+        """How much more it is in front of all smoke."""
+        return self.strength * (1 - self.ambient)
 
 
 class LightVolume:
     """The optical depth of the smoke between each place and the light.
 
     Attributes:
-        depth: `[x, y, z]`, optical depths at the centres of cells that are as coarse as asked for.
+        shade: What it does to colours, as optical depths at the centres of cells that are as coarse
+            as asked for.
         shape: Cells of the density.
     """
 
-    @torch.no_grad()
     def __init__(
         self,
-        density: Float[Tensor, "x y z"],
+        density: FloatArray,
         light: Light,
         *,
         gamma: float,
@@ -95,10 +90,10 @@ class LightVolume:
         spacing: float = 0.0,
         origin: Sequence[int] = (0, 0, 0),
     ) -> None:
-        """Send the light through the smoke. Deterministic bit for bit on the CPU.
+        """Send the light through the smoke. Deterministic bit for bit.
 
         Args:
-            density: Non-negative.
+            density: `[x, y, z]`, non-negative.
             light: Where it comes from.
             gamma: Extinction of density one, 1/length.
             cells_to_world: 4×4, affine and invertible, as in `view.render`; lengths are those of
@@ -112,28 +107,27 @@ class LightVolume:
         """
         if not gamma >= 0:
             raise OptionError(f"gamma: expected 0 or more, got {gamma}")
-        self.light, self.shape = light, density.shape
+        self.shape = density.shape
         matrix = np.eye(3) if cells_to_world is None else cells_to_world[:3, :3]
         edges = np.linalg.norm(matrix, axis=0)
         times = np.maximum(np.rint(spacing / edges), 1).astype(int)
         before = times + np.asarray(origin) % times
         coarse = _averaged(density, times.tolist(), before.tolist())
         towards = np.linalg.inv(matrix * times) @ light.towards
-        self.depth = _swept(coarse * gamma, towards)
-        self._first = density.new_tensor(before - (times - 1) / 2)
-        self._times = density.new_tensor(times)
+        self.shade = Shade(
+            _swept(coarse * np.float32(gamma), towards),
+            tuple((before - (times - 1) / 2).tolist()),
+            tuple(times.astype(float).tolist()),
+            _OCTAVES,
+            light.base,
+            light.gain,
+        )
 
-    def at(self, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
-        """What colours at points, in cells of the density, are multiplied by."""
-        where = (points + self._first) / self._times
-        return self.light.factor(sample(self.depth[..., None], where)[:, 0])
-
-    def check(self, density: Tensor) -> None:
+    def check(self, shape: Sequence[int]) -> None:
         """Raise `ShapeError` unless it is the light of smoke with as many cells."""
-        if density.shape != self.shape:
+        if tuple(shape) != self.shape:
             raise ShapeError(
-                f"light: expected that of smoke of {tuple(density.shape)} cells, "
-                f"got {tuple(self.shape)}"
+                f"light: expected that of smoke of {tuple(shape)} cells, got {self.shape}"
             )
 
 
@@ -142,19 +136,23 @@ def spacing_for(lower: AnyArray, upper: AnyArray) -> float:
     return float(np.max(np.asarray(upper) - np.asarray(lower))) / FINEST
 
 
-def _averaged(density: Tensor, times: Sequence[int], before: Sequence[int]) -> Tensor:
+def _averaged(density: FloatArray, times: Sequence[int], before: Sequence[int]) -> FloatArray:
     """Means over blocks, with a block or more of nothing around the smoke."""
-    sides: list[int] = []
-    for size, block, first in zip(density.shape, times, before, strict=True):
-        last = block + -(size + first) % block
-        sides = [first, last, *sides]  # torch pads the last axis first
-    padded = functional.pad(density, sides)
-    if max(times) == 1:
-        return padded
-    return functional.avg_pool3d(padded[None, None], tuple(times))[0, 0]
+    means = density
+    for axis, (block, first) in enumerate(zip(times, before, strict=True)):
+        means = np.moveaxis(means, axis, 0)
+        last = block + -(len(means) + first) % block
+        padded = np.zeros((first + len(means) + last, *means.shape[1:]), np.float32)
+        padded[first : first + len(means)] = means
+        # A layer at a time is quicker than the mean along an axis of blocks.
+        total = padded[::block].copy()
+        for layer in range(1, block):
+            total += padded[layer::block]
+        means = np.moveaxis(total / np.float32(block), 0, axis)
+    return means
 
 
-def _swept(extinction: Tensor, towards: AnyArray) -> Tensor:
+def _swept(extinction: FloatArray, towards: AnyArray) -> FloatArray:
     """Optical depth from each cell to where the light enters.
 
     Layer by layer away from the light: what lies before a cell is interpolated in the layer
@@ -166,26 +164,27 @@ def _swept(extinction: Tensor, towards: AnyArray) -> Tensor:
     """
     main = int(np.abs(towards).argmax())
     others = [axis for axis in range(3) if axis != main]
-    layers = extinction.movedim(main, 0)
+    layers = np.moveaxis(extinction, main, 0)
     if towards[main] > 0:
-        layers = layers.flip(0)
+        layers = layers[::-1]
+    layers = np.ascontiguousarray(layers)
     half = 0.5 / abs(float(towards[main]))
     shift = [float(towards[axis] / abs(towards[main])) for axis in others]
-    depth = torch.zeros_like(layers)
+    depth = np.zeros_like(layers)
     for k in range(1, len(layers)):
         reached = depth[k - 1] + half * layers[k - 1]
         depth[k] = _shifted(reached, *shift) + half * layers[k]
     if towards[main] > 0:
-        depth = depth.flip(0)
-    return depth.movedim(0, main).contiguous()
+        depth = depth[::-1]
+    return np.ascontiguousarray(np.moveaxis(depth, 0, main))
 
 
-def _shifted(layer: Tensor, down: float, right: float) -> Tensor:
+def _shifted(layer: FloatArray, down: float, right: float) -> FloatArray:
     """Values at `[i + down, j + right]`, interpolated; zero outside; shifts within ±1."""
     rows, columns = layer.shape
-    padded = functional.pad(layer, (2, 2, 2, 2))
+    padded = np.pad(layer, 2)
     i, j = floor(down), floor(right)
-    a, b = down - i, right - j
+    a, b = np.float32(down - i), np.float32(right - j)
     top = padded[2 + i : 2 + i + rows]
     bottom = padded[3 + i : 3 + i + rows]
     mixed = (1 - a) * top + a * bottom

@@ -15,16 +15,11 @@ from torch import Tensor
 from torch.nn import functional
 
 from vnca.core.errors import ShapeError
+from vnca.rendering import THINNEST, UNSEEN
 
 # Candidate samples looked at together. It bounds the memory of large pictures, and a few tens of
 # megabytes are reused from the allocator where hundreds are mapped and cleared each time anew.
 SAMPLES_AT_ONCE = 1 << 20
-
-
-UNSEEN = 5e-4
-"""What gets less light through than this is left out: an eighth of a step of 8-bit colour."""
-THINNEST = 1e-12
-"""Density this thin is invisible; below it nothing is divided by it."""
 
 
 @dataclass(frozen=True, eq=False)

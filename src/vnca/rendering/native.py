@@ -14,12 +14,14 @@ from vnca.engine import native
 from vnca.engine.native.decoding import show, show_backward
 from vnca.engine.native.marching import (
     Marcher,
+    Rays,
     Seen,
     Shading,
     composite,
     composite_backward,
 )
-from vnca.rendering.march import UNSEEN, sample
+from vnca.rendering import UNSEEN
+from vnca.rendering.march import sample
 
 RAYS_AT_ONCE = 1 << 14
 """Rays marched together: it bounds the memory of large pictures."""
@@ -75,15 +77,10 @@ def samples_along(
     begins = _array(torch.as_tensor(offset, dtype=density.dtype).view(-1))
     for start in range(0, len(from_), RAYS_AT_ONCE):
         some = slice(start, start + RAYS_AT_ONCE)
-        seen = marcher.along(
-            from_[some],
-            along[some],
-            begins if len(begins) == 1 else begins[some],
-            near=near,
-            step=step,
-            extinction=extinction,
-            most=-math.log(UNSEEN),
-        )
+        offsets = begins if len(begins) == 1 else begins[some]
+        most = -math.log(UNSEEN)
+        rays = Rays(from_[some], along[some], offsets, near, step, extinction, most)
+        seen = marcher.along(rays)
         if seen is None or not len(seen.depth):
             continue
         points, found = torch.from_numpy(seen.points), torch.from_numpy(seen.density)

@@ -8,7 +8,7 @@ from study import Study
 
 from vnca.core.colour import srgb_to_linear
 from vnca.core.volume import Volume
-from vnca.rendering import View
+from vnca.rendering.view import View
 from vnca.rule import Rule, RuleConfig, Scales
 
 

@@ -169,6 +169,25 @@ def march(
     threads: int,
     /,
 ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]: ...
+def film(
+    density: FloatArray,
+    near: AnyArray,
+    colour: FloatArray,
+    light: tuple[FloatArray, Sequence[float], Sequence[float], FloatArray, float, float] | None,
+    origins: FloatArray,
+    directions: FloatArray,
+    offsets: FloatArray,
+    lower: Sequence[float],
+    upper: Sequence[float],
+    nearest: float,
+    step: float,
+    extinction: float,
+    most: float,
+    to_colour: FloatArray,
+    passes: FloatArray,
+    threads: int,
+    /,
+) -> None: ...
 def composite(
     starts: IntArray,
     density: FloatArray,

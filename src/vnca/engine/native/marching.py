@@ -1,6 +1,7 @@
 """Smoke along the rays of a camera, in the native core: its samples, and the light of rays.
 
-What is computed is that of `vnca.rendering.march`, on the CPU and in float32.
+What is computed is that of `vnca.rendering.march`, on the CPU and in float32; or all of it at once,
+for films.
 """
 
 from dataclasses import dataclass, field
@@ -31,6 +32,48 @@ class Seen(NamedTuple):
     density: FloatArray
 
 
+class Rays(NamedTuple):
+    """What is sampled: at depths (k + offset) · step for whole k.
+
+    Attributes:
+        origins: `[rays, 3]`, cell coordinates.
+        directions: `[rays, 3]`, cells for each length of depth.
+        offsets: In steps, in [0, 1): `[1]` of all rays, or `[rays]` of each.
+        near: Depth before which nothing is sampled.
+        step: Depth between samples.
+        extinction: Of density one, in a step: the least that it can be.
+        most: Optical depth behind which there is nothing to be seen.
+    """
+
+    origins: FloatArray
+    directions: FloatArray
+    offsets: FloatArray
+    near: float
+    step: float
+    extinction: float
+    most: float
+
+
+class Shade(NamedTuple):
+    """A light behind smoke: colours are multiplied by base + gain · min(1, Σ weight exp(−part τ)).
+
+    Attributes:
+        depth: `[x, y, z]`, τ, at the centres of cells of its own; none outside of them.
+        first: A point of the density is (point + first) / times in these cells.
+        times: How much larger they are.
+        octaves: `[n, 2]`, weights and parts.
+        base: Share that is always there.
+        gain: What is added where nothing is in the way.
+    """
+
+    depth: FloatArray
+    first: tuple[float, float, float]
+    times: tuple[float, float, float]
+    octaves: FloatArray
+    base: float
+    gain: float
+
+
 @dataclass(frozen=True, eq=False)
 class Marcher:
     """A density `[x, y, z]` that rays are sampled in."""
@@ -56,30 +99,8 @@ class Marcher:
     def _threads(self) -> int:
         return self.threads or default_threads()
 
-    def along(
-        self,
-        origins: FloatArray,
-        directions: FloatArray,
-        offsets: FloatArray,
-        *,
-        near: float,
-        step: float,
-        extinction: float,
-        most: float,
-    ) -> Seen | None:
-        """Samples at depths (k + offset) · step for whole k, where there is smoke.
-
-        Args:
-            origins: `[rays, 3]`, cell coordinates.
-            directions: `[rays, 3]`, cells for each length of depth.
-            offsets: In steps, in [0, 1): `[1]` of all rays, or `[rays]` of each.
-            near: Depth before which nothing is sampled.
-            step: Depth between samples.
-            extinction: Of density one, in a step: the least that it can be.
-            most: Optical depth behind which there is nothing to be seen.
-
-        Returns:
-            The samples; None without smoke.
+    def along(self, rays: Rays) -> Seen | None:
+        """The samples that can be seen, where there is smoke; None without smoke.
 
         Raises:
             BackendUnavailableError: If the extension was not built.
@@ -87,9 +108,35 @@ class Marcher:
         """
         if self._box is None:
             return None
-        arrays = (self.density, self._near, origins, directions, offsets)
-        how = (*self._box, near, step, extinction, most, self._threads)
+        arrays = (self.density, self._near, *rays[:3])
+        how = (*self._box, *rays[3:], self._threads)
         return Seen(*checked(_OPERATION, extension().march, *arrays, *how))
+
+    def film(
+        self, colour: FloatArray, rays: Rays, shade: Shade | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """What rays see of smoke of that density and some colour.
+
+        Args:
+            colour: Linear RGB `[x, y, z, 3]` of the cells, interpolated weighted by density.
+            rays: Where it is sampled; the extinction is the true one.
+            shade: What lights it; None where it glows.
+
+        Returns:
+            Premultiplied linear RGB `[rays, 3]`, and the share of the light from behind that passes
+            `[rays]`.
+
+        Raises:
+            BackendUnavailableError: If the extension was not built.
+            ShapeError: If arrays are not contiguous, or of other shapes or types.
+        """
+        count = len(rays.origins)
+        pixels, passes = np.zeros((count, 3), np.float32), np.ones(count, np.float32)
+        if self._box is not None:
+            arrays = (self.density, self._near, colour, shade, *rays[:3])
+            how = (*self._box, *rays[3:], pixels, passes, self._threads)
+            checked("filming", extension().film, *arrays, *how)
+        return pixels, passes
 
 
 class Shading(NamedTuple):

@@ -16,8 +16,8 @@ from vnca.core.volume import Volume
 from vnca.engine.domain import Domain
 from vnca.losses import luma
 from vnca.losses.appearance import AppearanceLoss
-from vnca.rendering import Shader, View, projected_velocity, render
 from vnca.rendering.colour import linear_to_srgb, srgb_to_linear
+from vnca.rendering.view import Shader, View, projected_velocity, render
 from vnca.rule import SMOKE_THRESHOLD, Rule, gamma_for_own_colour
 from vnca.rule.conditioning import DENSITY_LIMIT as TOLD_DENSITY_LIMIT
 from vnca.rule.conditioning import normalised_velocity, priors

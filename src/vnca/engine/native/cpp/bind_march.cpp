@@ -3,13 +3,18 @@
 #include "bind_march.hpp"
 
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <tuple>
 #include <utility>
 
 #include "arrays.hpp"
+#include "film.hpp"
 #include "march.hpp"
 
 namespace vnca {
@@ -20,10 +25,46 @@ using Point = std::array<float, 3>;
 
 Density checked_density(const Input& density, const Input& near) {
     Density smoke = {data_of<float>(density, "density", {ANY, ANY, ANY}), {}, nullptr};
-    for (int axis = 0; axis < 3; ++axis) smoke.shape[axis] = length(density, axis);
+    for (int axis = 0; axis < 3; ++axis) {
+        smoke.shape[axis] = length(density, axis);
+        in_range("cells along an axis", smoke.shape[axis], 1, INT32_MAX);
+    }
     smoke.near_smoke = data_of<std::uint8_t>(
         near, "near", {smoke.shape[0] + 1, smoke.shape[1] + 1, smoke.shape[2] + 1});
     return smoke;
+}
+
+Rays checked_rays(const Density& smoke, const Input& origins, const Input& directions,
+                  const Input& offsets, const Point& lower, const Point& upper, float nearest, float step,
+                  float extinction, float most) {
+    const std::int64_t rays = length(origins, 0), apart = length(offsets, 0) == 1 ? 0 : 1;
+    if (!(step > 0)) throw nb::value_error("step: expected more than zero");
+    Rays along = {data_of<float>(origins, "origins", {rays, 3}),
+                  data_of<float>(directions, "directions", {rays, 3}),
+                  data_of<float>(offsets, "offsets", {apart ? rays : 1}),
+                  rays, apart, {}, {}, nearest, step, extinction, most};
+    // Inside of the smoke's own box, so that every step is in reach of a counter.
+    for (int axis = 0; axis < 3; ++axis) {
+        along.lower[axis] = std::max(lower[axis], -1.0f);
+        along.upper[axis] = std::min(upper[axis], float(smoke.shape[axis]));
+    }
+    return along;
+}
+
+// Depths, where they lie, octaves, base and gain.
+using Lit = std::tuple<Input, Point, Point, Input, float, float>;
+
+Light checked_light(const Lit& lit) {
+    const auto& [depth, first, times, octaves, base, gain] = lit;
+    Light light = {data_of<float>(depth, "depths of the light", {ANY, ANY, ANY}), {}, {}, {},
+                   data_of<float>(octaves, "octaves", {ANY, 2}), length(octaves, 0), base, gain};
+    for (int axis = 0; axis < 3; ++axis) {
+        light.shape[axis] = length(depth, axis);
+        in_range("cells of light along an axis", light.shape[axis], 1, INT32_MAX);
+        light.first[axis] = first[axis];
+        light.times[axis] = times[axis];
+    }
+    return light;
 }
 
 // An array that owns what it is made of.
@@ -75,17 +116,8 @@ void bind_march(nb::module_& m) {
                       const Point& lower, const Point& upper, float nearest, float step,
                       float extinction, float most, int threads) {
         const Density smoke = checked_density(density, near);
-        const std::int64_t rays = length(origins, 0), apart = length(offsets, 0) == 1 ? 0 : 1;
-        if (!(step > 0)) throw nb::value_error("step: expected more than zero");
-        Rays along = {data_of<float>(origins, "origins", {rays, 3}),
-                      data_of<float>(directions, "directions", {rays, 3}),
-                      data_of<float>(offsets, "offsets", {apart ? rays : 1}),
-                      rays, apart, {}, {}, nearest, step, extinction, most};
-        // Inside of the smoke's own box, so that every step is in reach of a counter.
-        for (int axis = 0; axis < 3; ++axis) {
-            along.lower[axis] = std::max(lower[axis], -1.0f);
-            along.upper[axis] = std::min(upper[axis], float(smoke.shape[axis]));
-        }
+        const Rays along = checked_rays(smoke, origins, directions, offsets, lower, upper, nearest, step,
+                                        extinction, most);
         Sampled found;
         {
             nb::gil_scoped_release released;
@@ -93,6 +125,25 @@ void bind_march(nb::module_& m) {
         }
         return nb::make_tuple(owned(std::move(found.starts), 1), owned(std::move(found.points), 3),
                               owned(std::move(found.depth), 1), owned(std::move(found.density), 1));
+    });
+
+    m.def("film", [](Input density, Input near, Input colour, const std::optional<Lit>& lit, Input origins,
+                     Input directions, Input offsets, const Point& lower, const Point& upper,
+                     float nearest, float step, float extinction, float most, Output to_colour,
+                     Output passes, int threads) {
+        const Density smoke = checked_density(density, near);
+        const float* const hue = data_of<float>(
+            colour, "colour", {smoke.shape[0], smoke.shape[1], smoke.shape[2], 3});
+        const Rays along = checked_rays(smoke, origins, directions, offsets, lower, upper, nearest, step,
+                                        extinction, most);
+        const std::optional<Light> light = lit ? std::optional(checked_light(*lit)) : std::nullopt;
+        float* const pixels = data_of<float>(to_colour, "colour of rays", {along.count, 3});
+        float* const through = data_of<float>(passes, "what passes", {along.count});
+        std::vector<Extent> inputs = {density, near, colour, origins, directions, offsets};
+        if (lit) inputs.insert(inputs.end(), {std::get<0>(*lit), std::get<3>(*lit)});
+        check_apart({to_colour, passes}, inputs);
+        nb::gil_scoped_release released;
+        film(smoke, hue, light ? &*light : nullptr, along, pixels, through, threads);
     });
 
     m.def("composite", [](Input starts, Input density, Input colour, Input depth, float extinction,

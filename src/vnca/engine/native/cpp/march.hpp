@@ -14,6 +14,40 @@
 namespace vnca {
 
 constexpr std::int64_t RAYS_AT_ONCE = 256;  // fewest that a thread takes
+constexpr float MOST_SAMPLES = 1 << 24;     // on a ray: beyond, floats are no counters
+
+// The whole number below a value that fits into one; std::floor is a call where the processor is any.
+inline std::int64_t below(float value) {
+    const auto whole = std::int64_t(value);
+    return whole - (float(whole) > value);
+}
+
+// The eight cells around a point, and their weights in trilinear interpolation: none outside of a field.
+struct Corners {
+    std::int64_t cell[8];
+    float weight[8];
+
+    // `first` is the cell below the point; z is fastest in a field of `shape`.
+    Corners(const std::int64_t shape[3], const std::int64_t first[3], const float point[3]) {
+        std::int64_t at[3][2];
+        float share[3][2];
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::int64_t here = first[axis], next = here + 1, size = shape[axis];
+            const float above = point[axis] - float(here);
+            const bool is_in = std::uint64_t(here) < std::uint64_t(size);
+            const bool is_next_in = std::uint64_t(next) < std::uint64_t(size);
+            at[axis][0] = is_in ? here : 0;
+            at[axis][1] = is_next_in ? next : 0;
+            share[axis][0] = is_in ? 1 - above : 0;
+            share[axis][1] = is_next_in ? above : 0;
+        }
+        for (int k = 0; k < 8; ++k) {
+            const int x = k >> 2, y = k >> 1 & 1, z = k & 1;
+            cell[k] = (at[0][x] * shape[1] + at[1][y]) * shape[2] + at[2][z];
+            weight[k] = share[0][x] * share[1][y] * share[2][z];
+        }
+    }
+};
 
 // Density [shape], z fastest, and where interpolation meets any: [shape + 1], whose entry [i, j, k]
 // stands for the points from (i − 1, j − 1, k − 1) to (i, j, k).
@@ -21,10 +55,6 @@ struct Density {
     const float* values;
     std::int64_t shape[3];
     const std::uint8_t* near_smoke;
-
-    std::int64_t place(std::int64_t x, std::int64_t y, std::int64_t z) const {
-        return (x * shape[1] + y) * shape[2] + z;
-    }
 
     bool near(const std::int64_t first[3]) const {
         std::int64_t at = 0;
@@ -34,25 +64,9 @@ struct Density {
         return near_smoke[at] != 0;
     }
 
-    // Trilinear, zero outside. `first` is the cell below the point.
-    float at(const std::int64_t first[3], const float point[3]) const {
-        float share[3][2], sum = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            share[axis][1] = point[axis] - float(first[axis]);
-            share[axis][0] = 1 - share[axis][1];
-        }
-        for (int k = 0; k < 8; ++k) {
-            const int step[3] = {k >> 2, k >> 1 & 1, k & 1};
-            std::int64_t cell[3];
-            bool inside = true;
-            for (int axis = 0; axis < 3; ++axis) {
-                cell[axis] = first[axis] + step[axis];
-                inside = inside && cell[axis] >= 0 && cell[axis] < shape[axis];
-            }
-            if (inside)
-                sum += share[0][step[0]] * share[1][step[1]] * share[2][step[2]] *
-                       values[place(cell[0], cell[1], cell[2])];
-        }
+    float at(const Corners& corners) const {
+        float sum = 0;
+        for (int k = 0; k < 8; ++k) sum += corners.weight[k] * values[corners.cell[k]];
         return sum;
     }
 };
@@ -121,7 +135,9 @@ class Marching {
 public:
     Marching(const Density& density, const Rays& rays) : density_(density), rays_(rays) {}
 
-    void along(std::int64_t ray, Sampled& to) const {
+    // Calls take(point, corners, density, depth) at the samples of a ray that can be seen, near to far.
+    template <class Take>
+    void along(std::int64_t ray, Take&& take) const {
         const float* const origin = rays_.origins + 3 * ray;
         const float* const direction = rays_.directions + 3 * ray;
         const float offset = rays_.offsets[rays_.offsets_apart * ray], step = rays_.step;
@@ -135,17 +151,17 @@ public:
         }
         const float first = std::ceil(enter / step - offset);
         const float count = std::floor(leave / step - offset) - first + 1;
+        if (!(count < MOST_SAMPLES)) return;  // it never leaves
         float reached = 0;
         for (std::int64_t k = 0; float(k) < count && reached < rays_.most; ++k) {
             const float depth = (first + float(k) + offset) * step;
             float point[3];
             std::int64_t cell[3];
             if (!find(origin, direction, depth, point, cell) || !density_.near(cell)) continue;
-            const float here = density_.at(cell, point);
+            const Corners corners(density_.shape, cell, point);
+            const float here = density_.at(corners);
             if (!(here > 0)) continue;  // on the very border of the smoke, or by rounding beyond it
-            to.points.insert(to.points.end(), point, point + 3);
-            to.depth.push_back(depth);
-            to.density.push_back(here);
+            take(point, corners, here, depth);
             reached += here * rays_.extinction;
         }
     }
@@ -158,7 +174,7 @@ private:
             point[axis] = origin[axis] + depth * direction[axis];
             if (!(point[axis] > rays_.lower[axis] - 1 && point[axis] < rays_.upper[axis] + 1))
                 return false;
-            cell[axis] = std::int64_t(std::floor(point[axis]));
+            cell[axis] = below(point[axis]);
         }
         return true;
     }
@@ -177,7 +193,11 @@ inline Sampled march(const Density& density, const Rays& rays, int threads) {
         Sampled& to = found[range];
         for (std::int64_t ray = ranges.begin(range); ray < ranges.end(range); ++ray) {
             to.starts.push_back(std::int64_t(to.depth.size()));
-            marching.along(ray, to);
+            marching.along(ray, [&](const float point[3], const Corners&, float here, float depth) {
+                to.points.insert(to.points.end(), point, point + 3);
+                to.depth.push_back(depth);
+                to.density.push_back(here);
+            });
         }
     });
     Sampled all;
