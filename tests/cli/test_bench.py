@@ -150,6 +150,23 @@ def test_training_on_a_given_frame_is_timed(
     assert [row["backend"] for row in rows] == ["plain", "reference"]
 
 
+def test_training_is_timed_in_every_backend_that_has_gradients(
+    vnca: Vnca, frame: Path, style: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(contenders, "_why_not_compiled", lambda device: "takes minutes")
+    report = tmp_path / "train.json"
+    asked = ("bench", "train", "--frame", frame, "--style", style, "--json", report)
+    size = ("--hidden", "8", "--rollout", "2", "--view-size", "32", "--device", "cpu")
+    outcome = vnca(*asked, *size, "--threads", "1", "--repeats", "1")
+    assert outcome.code == 0, outcome.err
+    found = [row["backend"] for row in json.loads(report.read_text())["rows"]]
+    assert found[:2] == ["plain", "reference"]
+    assert "onnx" not in found
+    refused = vnca(*asked, "--backends", "plain,onnx")
+    assert refused.code == 2
+    assert "--backends plain,onnx: expected of plain" in refused.complaint
+
+
 def test_painting_a_given_sequence_is_timed(
     vnca: Vnca, model: Path, smoke: Path, tmp_path: Path
 ) -> None:

@@ -129,6 +129,8 @@ class Place(NamedTuple):
 
 BACKENDS = ("plain", "compile", "onnx", "reference", "native", "triton")
 """`compile` is `plain` under `torch.compile`, `onnx` the same in ONNX Runtime, forward only."""
+TRAINABLE = tuple(name for name in BACKENDS if name != "onnx")
+"""Those with gradients."""
 PASSES = ("forward", "backward", "both")
 DTYPES = {
     "float32": torch.float32,

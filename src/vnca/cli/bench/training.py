@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 
 from vnca.bench import run_facts
-from vnca.bench.contenders import available, require
+from vnca.bench.contenders import TRAINABLE, available, require
 from vnca.bench.step import PEAKS, TOLERANCES, StepConfig, StepRun, measure_steps, prepare
 from vnca.bench.train import Training, measure_training
 from vnca.cli.bench import Rows, Tables, parse_bench, short
@@ -132,6 +132,10 @@ class BenchTrain(Tables):
             value = getattr(self, name)
             if value is not None and value < 1:
                 raise OptionError(f"--{name} {value}: at least 1 is needed")
+        if not set(self.backends) <= set(TRAINABLE):
+            raise OptionError(
+                f"--backends {','.join(self.backends)}: expected of {', '.join(TRAINABLE)}"
+            )
 
     @property
     def config(self) -> SmokeConfig:
@@ -163,11 +167,8 @@ def run_train(arguments: Sequence[str]) -> None:
     network = load_network(config.features, device)
     budget = memory_budget(options.memory_budget)
     training = Training(_smoke(options), _style(options), config, network, device, budget)
-    rows = measure_training(
-        training,
-        options.backends or available("float32", device.type),
-        repeats=options.repeats,
-    )
+    able = tuple(name for name in available("float32", device.type) if name in TRAINABLE)
+    rows = measure_training(training, options.backends or able, repeats=options.repeats)
     rows = [{**row, "preset": options.preset} for row in rows]
     options.print("{device}, {threads} threads, torch {torch}, vnca {vnca}".format(**facts))
     options.print("\n".join(_training_table(rows)))
