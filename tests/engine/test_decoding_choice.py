@@ -19,7 +19,7 @@ def test_auto_is_native_with_the_threads_asked_for() -> None:
     assert chosen.keywords == {"threads": 3}
     arrays = array_decode("native", threads=2)
     for kernel in arrays:
-        assert kernel.func.__module__ == "vnca.engine.native"
+        assert kernel.func.__module__ == "vnca.engine.native.decoding"
         assert kernel.keywords == {"threads": 2}
 
 
