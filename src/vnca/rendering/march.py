@@ -6,7 +6,7 @@ figures. Positions are not differentiated; values and what is gathered from them
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import torch
@@ -31,7 +31,7 @@ class Samples:
 
     Attributes:
         points: `[n, 3]`, cell coordinates of the samples.
-        density: `[n]`, interpolated; differentiable in that of the cells.
+        density: `[n]`, interpolated.
         ray: `[rows]`, which of the rays marched each row is.
         row: `[n]`, row of each sample in the table.
         column: `[n]`, its column.
@@ -70,7 +70,6 @@ class Samples:
         depth = torch.where(total > THINNEST, depth, math.inf)
         return gather(weights, table[..., 1:]), passes, depth
 
-    @torch.no_grad()
     def seen(self, extinction: float) -> "Samples":
         """Without what is hidden, if density one takes at least so much in a step.
 
@@ -88,6 +87,7 @@ class Samples:
         return empty.index_put((self.row, self.column), values)
 
 
+@torch.no_grad()
 def samples_along(
     density: Tensor,
     origins: Tensor,
@@ -114,23 +114,6 @@ def samples_along(
         offset: Where the samples begin, in steps, in [0, 1); of all rays, or `[rays]` of each.
         extinction: Of density one, in a step: the least that it can be.
     """
-    field = density[..., None]
-    for samples in _near_rays(density, origins, directions, near=near, step=step, offset=offset):
-        seen = samples.seen(extinction)
-        yield replace(seen, density=sample(field, seen.points)[:, 0])
-
-
-@torch.no_grad()
-def _near_rays(
-    density: Tensor,
-    origins: Tensor,
-    directions: Tensor,
-    *,
-    near: float,
-    step: float,
-    offset: float | Tensor,
-) -> Iterator[Samples]:
-    """Those of `samples_along`, and what is hidden."""
     smoke = density > 0
     if not smoke.any():
         return
@@ -152,7 +135,8 @@ def _near_rays(
         row, column = torch.nonzero(inside & _look_up(near_smoke, points), as_tuple=True)
         if len(row):
             points, depth = points[row, column], depth[row, column]
-            yield _pack(points, sample(density[..., None], points)[:, 0], depth, row, rays)
+            here = sample(density[..., None], points)[:, 0]
+            yield _pack(points, here, depth, row, rays).seen(extinction)
 
 
 def _pack(points: Tensor, density: Tensor, depth: Tensor, ray: Tensor, rays: Tensor) -> Samples:

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from vnca.core import FloatArray
 from vnca.engine import native
+from vnca.engine.native.autograd import array_of
 from vnca.engine.native.decoding import show, show_backward
 from vnca.engine.native.marching import (
     Marcher,
@@ -21,7 +21,6 @@ from vnca.engine.native.marching import (
     composite_backward,
 )
 from vnca.rendering import UNSEEN
-from vnca.rendering.march import sample
 
 RAYS_AT_ONCE = 1 << 14
 """Rays marched together: it bounds the memory of large pictures."""
@@ -42,7 +41,7 @@ class Samples:
 
     Attributes:
         points: `[n, 3]`, cell coordinates of the samples.
-        density: `[n]`, interpolated; differentiable in that of the cells.
+        density: `[n]`, interpolated.
         ray: `[rays]`, which of all rays they are on, each once.
     """
 
@@ -71,10 +70,9 @@ def samples_along(
     extinction: float,
 ) -> Iterator[Samples]:
     """The samples that `march.samples_along` finds, for a group of rays at a time."""
-    differentiable = density.requires_grad and torch.is_grad_enabled()
-    marcher = Marcher(_array(density))
-    from_, along = _array(origins), _array(directions)
-    begins = _array(torch.as_tensor(offset, dtype=density.dtype).view(-1))
+    marcher = Marcher(array_of(density))
+    from_, along = array_of(origins), array_of(directions)
+    begins = array_of(torch.as_tensor(offset, dtype=density.dtype).view(-1))
     for start in range(0, len(from_), RAYS_AT_ONCE):
         some = slice(start, start + RAYS_AT_ONCE)
         offsets = begins if len(begins) == 1 else begins[some]
@@ -84,8 +82,6 @@ def samples_along(
         if seen is None or not len(seen.depth):
             continue
         points, found = torch.from_numpy(seen.points), torch.from_numpy(seen.density)
-        if differentiable:
-            found = sample(density[..., None], points)[:, 0]
         ray = torch.arange(start, start + len(seen.starts) - 1)
         yield Samples(points, found, ray, seen)
 
@@ -107,7 +103,7 @@ class _Light(torch.autograd.Function):
     ) -> tuple[Tensor | None, ...]:
         of_colour, of_passes, _ = grad_outputs
         shading = _shading(ctx, *ctx.saved_tensors)
-        gradients = composite_backward(shading, _array(of_colour), _array(of_passes))
+        gradients = composite_backward(shading, array_of(of_colour), array_of(of_passes))
         return *map(torch.from_numpy, gradients), None, None, None
 
 
@@ -131,7 +127,7 @@ class _Shown(torch.autograd.Function):
     def forward(ctx: Any, *inputs: Any) -> tuple[Tensor, Tensor]:
         seen, ctx.most = inputs
         ctx.save_for_backward(seen)
-        colour, factor = map(torch.from_numpy, show(_array(seen), ctx.most))
+        colour, factor = map(torch.from_numpy, show(array_of(seen), ctx.most))
         return colour, factor
 
     @staticmethod
@@ -139,14 +135,10 @@ class _Shown(torch.autograd.Function):
     def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
         ctx: Any, *grad_outputs: Tensor
     ) -> tuple[Tensor | None, ...]:
-        (seen,) = map(_array, ctx.saved_tensors)
-        return torch.from_numpy(show_backward(seen, ctx.most, *map(_array, grad_outputs))), None
+        (seen,) = map(array_of, ctx.saved_tensors)
+        return torch.from_numpy(show_backward(seen, ctx.most, *map(array_of, grad_outputs))), None
 
 
 def _shading(ctx: Any, density: Tensor, colour: Tensor) -> Shading:
     seen: Seen = ctx.seen
-    return Shading(seen.starts, _array(density), _array(colour), seen.depth, *ctx.how)
-
-
-def _array(tensor: Tensor) -> FloatArray:
-    return tensor.detach().contiguous().numpy()
+    return Shading(seen.starts, array_of(density), array_of(colour), seen.depth, *ctx.how)

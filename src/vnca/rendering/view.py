@@ -192,7 +192,10 @@ def _render(
             hue = values[:, 1:] / dense[:, None].clamp_min(THINNEST)
         else:
             factors, hue = colour(samples.points)
-            dense = samples.density * factors
+            plain = samples.density  # which samples were found by, without a gradient
+            if density.requires_grad:
+                plain = sample(field, samples.points)[:, 0]
+            dense = plain * factors
         if light_at is not None:
             hue = hue * light_at(samples.points)[:, None]
         seen, passes, depth = samples.light(

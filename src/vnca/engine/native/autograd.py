@@ -51,7 +51,7 @@ def update(
 
 def changing_tensor_rows(hashes: Tensor, *, seed: int, step: int, probability: float) -> Tensor:
     """Rows `[m]` of the cells that change, as `native.changing_rows` draws them."""
-    rows = native.changing_rows(_array(hashes), seed=seed, step=step, probability=probability)
+    rows = native.changing_rows(array_of(hashes), seed=seed, step=step, probability=probability)
     return torch.from_numpy(rows)
 
 
@@ -61,7 +61,7 @@ class _Update(torch.autograd.Function):
         *tensors, threads, precision = inputs
         ctx.options = {"threads": threads, "precision": precision}
         ctx.save_for_backward(*tensors)
-        return torch.from_numpy(native.forward(*map(_array, tensors), **ctx.options))
+        return torch.from_numpy(native.forward(*map(array_of, tensors), **ctx.options))
 
     @staticmethod
     @once_differentiable
@@ -69,12 +69,13 @@ class _Update(torch.autograd.Function):
         ctx: Any, *grad_outputs: Tensor
     ) -> tuple[Tensor | None, ...]:
         *tensors, steering = ctx.saved_tensors
-        arrays = map(_array, (*tensors, *grad_outputs, steering))
+        arrays = map(array_of, (*tensors, *grad_outputs, steering))
         to_state, *to_weights = map(torch.from_numpy, native.backward(*arrays, **ctx.options))
         return to_state, None, None, None, *to_weights, None, None, None, None
 
 
-def _array(tensor: Tensor | None) -> Any:
+def array_of(tensor: Tensor | None) -> Any:
+    """What the native core takes of a tensor on the CPU: the same numbers, if they lie in a row."""
     return None if tensor is None else tensor.detach().contiguous().numpy()
 
 
@@ -112,7 +113,7 @@ class _Decode(torch.autograd.Function):
     def forward(ctx: Any, *inputs: Any) -> Tensor:
         *tensors, ctx.threads = inputs
         ctx.save_for_backward(*tensors)
-        state, rows, fractions, *weights = map(_array, tensors)
+        state, rows, fractions, *weights = map(array_of, tensors)
         seen = decoding.decode(
             state, rows, fractions, DecoderWeights(*weights), threads=ctx.threads
         )
@@ -123,13 +124,13 @@ class _Decode(torch.autograd.Function):
     def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
         ctx: Any, *grad_outputs: Tensor
     ) -> tuple[Tensor | None, ...]:
-        state, rows, fractions, *weights = map(_array, ctx.saved_tensors)
+        state, rows, fractions, *weights = map(array_of, ctx.saved_tensors)
         to_state, to_weights = decoding.decode_backward(
             state,
             rows,
             fractions,
             DecoderWeights(*weights),
-            _array(grad_outputs[0]),
+            array_of(grad_outputs[0]),
             threads=ctx.threads,
         )
         return torch.from_numpy(to_state), None, None, *map(torch.from_numpy, to_weights), None
