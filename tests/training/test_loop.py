@@ -177,9 +177,10 @@ def test_the_native_kernel_and_the_reference_learn_alike(trainer: Make) -> None:
     native, reference = (trainer(iterations=2, backend=name) for name in ("native", "reference"))
     for training in (native, reference):
         list(training.run())
-    ours, theirs = (np.concatenate([*map(np.ravel, weights(t))]) for t in (native, reference))
-    # Where a gradient is nearly zero, Adam steps by the sign of its rounding.
-    assert np.mean(abs(ours - theirs) > 5e-4) < 0.02
+    for ours, theirs in zip(weights(native), weights(reference), strict=True):
+        # Where a gradient is nearly zero, Adam steps by the sign of its rounding: in a fiftieth of
+        # the weights, or in one of a few.
+        assert np.sum(abs(ours - theirs) > 5e-4) <= max(1, 0.02 * ours.size)
 
 
 @pytest.mark.parametrize("backend", ["native", "reference"])
