@@ -37,6 +37,7 @@ AUTHORS = " + authors' scaling"
 REFERENCE = "reference"
 """The rule that nothing was taken from; all studies share it."""
 DRAFT = SmokeConfig(
+    iterations=250,
     rule=RuleConfig(position_prior=False),
     view=ViewConfig(size=96),
     pool=PoolConfig(size=16),
@@ -61,7 +62,7 @@ class Study:
     """How strongly cells perceive, and how weights begin: as the presets have it, or as the preset
     `authors`, after the authors' later code."""
     iterations: int | None = None
-    """Iterations of training, if not 400, or those of the preset."""
+    """Iterations of training, if not 250, or those of the preset."""
     size: int | None = None
     """Rows and columns of a view in training and judging; 96, or those of the preset if --full."""
     seeds: tuple[int, ...] = (0, 1)

@@ -18,6 +18,7 @@ SIZE = ("--rows", 32, "--columns", 40)
         ("turn.gif", ("--frames", 2, "--turntable", 3, "--field-of-view", 0)),
         ("frame_##.png", ("--transparent", "--light", 0, "--azimuth", 30)),
         ("strip.png", ("--strip", 2,)),
+        ("blurred.webp", ("--shutter", 0.5, "--turn", 20)),
     ],
 )  # fmt: skip
 def test_a_sequence_is_rendered_the_same_without_torch(

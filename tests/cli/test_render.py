@@ -53,6 +53,67 @@ def test_a_turntable_walks_around_while_a_frame_is_held(render: Callable[..., Pa
     assert pictures(render("turn.gif", "--turntable", 4)) == 12
 
 
+def test_painted_files_tell_how_fast_their_smoke_is(
+    vnca: Vnca, model: Path, smoke: Path, tmp_path: Path
+) -> None:
+    """The blur of a film of painted files is that of their units, or of those that are given."""
+
+    def seen(name: str, folder: Path, *options: object) -> Any:
+        out = tmp_path / "seen" / name
+        done = vnca("render", folder, "-o", out, "--frames", 2, *SIZE, *options)
+        assert done.code == 0, done.err
+        return pixels(out)
+
+    for path in smoke.glob("*.vdb"):  # simulated files say their units, which would count
+        with open_vdb(path) as file:
+            grids = [header.read() for header in file.grids.values()]
+        for grid in grids:
+            grid.metadata.pop("velocity_units", None)
+        write_vdb(path, grids)
+    quick = ("--warmup", 2, "--steps-per-frame", 1)
+    sharp = []
+    for scale in (1, 8):
+        folder = tmp_path / f"painted{scale}"
+        units = ("--velocity-units", "m/s", "--velocity-scale", scale)
+        done = vnca("stylize", model, smoke, "--out", folder, *quick, *units, "--refine", 2)
+        assert done.code == 0, done.err
+        sharp.append(seen("sharp.png", folder))
+    slow, fast = (
+        np.abs(seen("blurred.png", tmp_path / f"painted{scale}", "--shutter", 1) - still).mean()
+        for scale, still in zip((1, 8), sharp, strict=True)
+    )
+    assert fast > 2 * slow
+    given = ("--shutter", 1, "--velocity-units", "m/s", "--velocity-scale", 8)
+    asked = seen("asked.png", tmp_path / "painted1", *given)
+    assert np.abs(asked - sharp[0]).mean() > 2 * slow
+
+
+def test_a_preview_is_blurred_as_the_film_of_its_files(
+    vnca: Vnca, model: Path, smoke: Path, tmp_path: Path
+) -> None:
+    how = ("--shutter", 0.5, *SIZE)
+    quick = ("--warmup", 2, "--steps-per-frame", 1, "--velocity-scale", 3)
+    film = tmp_path / "preview.webp"
+    done = vnca("stylize", model, smoke, "-o", tmp_path / "p", *quick, "--preview", film, *how)
+    assert done.code == 0, done.err
+    later = vnca("render", tmp_path / "p", "--out", tmp_path / "film.webp", *how)
+    assert later.code == 0, later.err
+    assert film.read_bytes() == (tmp_path / "film.webp").read_bytes()
+
+
+def test_options_of_a_velocity_are_refused_where_nothing_is_blurred(
+    vnca: Vnca, smoke: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "film.webp"
+    done = vnca("render", smoke, "--out", out, *SIZE, "--time-scale", 0.4)
+    assert done.code == 2
+    assert done.err.strip() == "vnca: --time-scale: changes nothing where --shutter is 0"
+    done = vnca("render", smoke, "--out", out, *SIZE, "--shutter", 0.5, "--velocity-grid", "none")
+    assert done.code == 2
+    assert "frame 1: no velocity, which --shutter needs" in done.err
+    assert not out.exists()
+
+
 def test_pictures_are_numbered_like_their_frames(render: Callable[..., Path]) -> None:
     folder = render("frame_####.png").parent
     names = sorted(path.name for path in folder.iterdir())

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,11 +8,18 @@ from vnca.core.errors import FileFormatError
 from vnca.core.volume import Volume
 from vnca.io import SmokeFormat, read_smoke
 from vnca.io.painted import write_painted, write_smoke
-from vnca.io.provenance import Provenance, read_provenance
-from vnca.io.vdb import open_vdb, write_vdb
+from vnca.io.provenance import Provenance, as_told, read_provenance, velocity_of
+from vnca.io.vdb import Metadata, open_vdb, write_vdb
 
 PLAIN = SmokeFormat()
-PAINTED = Provenance(2.5, 0.75, "z", {"model": "night", "refine": 2, "strength": 0.5})
+MANTAFLOW = SmokeFormat("smoke", velocity_units="mantaflow", time_scale=0.4, staggered=True)
+PAINTED = Provenance(
+    2.5,
+    0.75,
+    "z",
+    {"model": "night", "refine": 2, "strength": 0.5},
+    velocity_of(MANTAFLOW),
+)
 
 
 @pytest.fixture
@@ -47,6 +55,32 @@ def test_names_that_are_no_text_and_long_seeds_are_told_too(smoke: Path, tmp_pat
     told = read_provenance(tmp_path / "painted.vdb")
     assert told is not None
     assert told.facts == {"style": "caf\\udce9.png", "seed": str(2**70)}
+
+
+def test_a_velocity_is_read_as_it_was_unless_something_else_is_asked_for() -> None:
+    assert velocity_of(PLAIN) == {}
+    assert PAINTED.velocity == {
+        "velocity_units": "mantaflow",
+        "time_scale": 0.4,
+        "staggered": True,
+    }
+    told = as_told(SmokeFormat("smoke"), PAINTED)
+    assert told == replace(MANTAFLOW, up_axis="z")
+    asked = SmokeFormat(velocity_scale=0.8, up_axis="y")
+    assert as_told(asked, PAINTED) == asked
+
+
+@pytest.mark.parametrize(
+    "text", ["{", "3", "[]x", '{"fps": "fast"}', '{"up_axis": "y"}', '["fps"]', "null"]
+)
+def test_a_velocity_that_makes_no_sense_is_refused(smoke: Path, tmp_path: Path, text: str) -> None:
+    paint(smoke, tmp_path / "painted.vdb", PAINTED)
+    with open_vdb(tmp_path / "painted.vdb") as file:
+        metadata = Metadata.of({n: entry.value for n, entry in file.metadata.items()})
+        metadata |= Metadata.of({"vnca_velocity": text})
+        write_vdb(tmp_path / "odd.vdb", list(file.grids.values()), metadata=metadata)
+    with pytest.raises(FileFormatError, match="vnca_velocity"):
+        read_provenance(tmp_path / "odd.vdb")
 
 
 def test_another_gamma_changes_the_extinction_in_proportion() -> None:

@@ -13,6 +13,7 @@
 #include "checks.hpp"
 #include "film.hpp"
 #include "march.hpp"
+#include "smear.hpp"
 
 using namespace vnca;
 
@@ -199,6 +200,20 @@ void films_are_the_same_of_callers() {
     });
 }
 
+void smearing_stays_in_the_picture() {
+    constexpr std::int64_t ROWS = 13, COLUMNS = 17;
+    const std::vector<float> even(ROWS * COLUMNS * CHANNELS, 0.25f);
+    std::vector<float> ways(2 * ROWS * COLUMNS), result(even.size());
+    for (const float longest : {0.0f, 0.01f, 3.0f, 1e6f, 1e30f}) {
+        for (std::size_t i = 0; i < ways.size(); ++i) ways[i] = longest * std::sin(float(i));
+        for (const int threads : {1, 3}) {
+            smear(even.data(), ways.data(), ROWS, COLUMNS, 9, 0.05f, result.data(), threads);
+            for (const float value : result)
+                expect(std::abs(value - 0.25f) < 1e-6f, "what is even stays so");
+        }
+    }
+}
+
 void what_is_wrong_is_left_out() {
     Smoke smoke(3, 3, 3, 1.0f);
     const float odd[] = {std::numeric_limits<float>::quiet_NaN(),
@@ -247,6 +262,7 @@ int main() {
     threads_do_not_change_a_bit();
     films_are_what_samples_add_up_to();
     films_are_the_same_of_callers();
+    smearing_stays_in_the_picture();
     what_is_wrong_is_left_out();
     std::puts("marching: all hold");
 }

@@ -1,18 +1,21 @@
 """What a painted file tells of its painting, so that every view of it shows it alike."""
 
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 from typing import Any
 
-from vnca.core.errors import FileFormatError
-from vnca.io.smoke_format import UpAxis
+from vnca.core.errors import FileFormatError, OptionError
+from vnca.core.records import changed, changed_fields
+from vnca.io.smoke_format import SmokeFormat, UpAxis
 from vnca.io.vdb import Metadata, open_vdb
 
 PREFIX = "vnca_"
 """Of all entries in the metadata of a file that tell of its painting."""
 _UP_AXES: tuple[UpAxis, ...] = ("z", "y")
+_VELOCITY = ("velocity_grid", "staggered", "velocity_units", "fps", "time_scale", "velocity_scale")
 
 
 @dataclass(frozen=True)
@@ -25,12 +28,15 @@ class Provenance:
             the smoke. Another γ changes the extinction in proportion.
         up_axis: Which axis of the file points up.
         facts: What else is worth telling: the rule's name, version, options; text or numbers.
+        velocity: How the velocity in the file is to be read: fields of `SmokeFormat` by name, where
+            they are not the defaults.
     """
 
     extinction: float
     gamma: float
     up_axis: UpAxis
     facts: Mapping[str, str | int | float] = field(default_factory=dict)
+    velocity: Mapping[str, Any] = field(default_factory=dict)
 
     def seen_with(self, gamma: float | None) -> float:
         """The extinction with another γ, if one is given."""
@@ -43,9 +49,22 @@ class Provenance:
             "extinction": self.extinction,
             "gamma": self.gamma,
             "up_axis": self.up_axis,
+            **({"velocity": json.dumps(self.velocity)} if self.velocity else {}),
             **self.facts,
         }
         return Metadata.of({PREFIX + name: _storable(value) for name, value in values.items()})
+
+
+def velocity_of(format: SmokeFormat) -> dict[str, Any]:
+    """What a painted file is to tell of a velocity that was read like that."""
+    asked = changed_fields(format, SmokeFormat())
+    return {name: getattr(format, name) for name in _VELOCITY if name in asked}
+
+
+def as_told(format: SmokeFormat, told: Provenance) -> SmokeFormat:
+    """How a painted file is read: as it tells, but for what is asked for otherwise."""
+    velocity = {} if velocity_of(format) else told.velocity
+    return replace(format, up_axis=format.up_axis or told.up_axis, **velocity)
 
 
 def without_provenance(metadata: Mapping[str, Any]) -> Metadata:
@@ -73,7 +92,18 @@ def read_provenance(path: Path) -> Provenance | None:
     up_axis = told.pop("up_axis", None)
     if up_axis not in _UP_AXES:
         raise _damaged(path, "up_axis", up_axis)
-    return Provenance(numbers[0], numbers[1], up_axis, told)
+    velocity = _velocity(path, told.pop("velocity", "{}"))
+    return Provenance(numbers[0], numbers[1], up_axis, told, velocity)
+
+
+def _velocity(path: Path, text: Any) -> dict[str, Any]:
+    try:
+        velocity = json.loads(text)
+        if isinstance(velocity, dict) and set(velocity) <= set(_VELOCITY):
+            return velocity_of(changed("velocity", SmokeFormat(), velocity))
+    except (TypeError, ValueError, OptionError):
+        pass
+    raise _damaged(path, "velocity", text)
 
 
 def _storable(value: str | int | float) -> str | int | float:

@@ -22,7 +22,7 @@ from vnca.core.files import existing_file, remove_file, remove_leftovers
 from vnca.core.lattice import Lattice
 from vnca.core.volume import length_of_cells, refined_transform
 from vnca.io import SmokeFormat, open_source, read_smoke, write_painted
-from vnca.io.provenance import Provenance
+from vnca.io.provenance import Provenance, velocity_of
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import up_axis_of
 from vnca.io.vdb import VdbFile
@@ -342,6 +342,7 @@ class Painter:
             scales.gamma * grid,
             up_axis_of(read.frame.path, self.smoke),
             {**self.facts, MARK: self.mark},
+            velocity_of(self.smoke),
         )
 
     def _read(self, at: int) -> Read | VncaError:

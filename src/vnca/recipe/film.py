@@ -1,7 +1,7 @@
 """Filming painted frames as they come."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from pathlib import Path
 from types import TracebackType
@@ -12,11 +12,14 @@ import numpy as np
 from vnca.core import AnyArray, FloatArray
 from vnca.core.camera import Shot, frame_box, parse_colour
 from vnca.core.colour import linear_to_srgb, srgb_to_linear
-from vnca.core.errors import OptionError
+from vnca.core.errors import OptionError, SequenceError
 from vnca.core.volume import Volume
+from vnca.io import SmokeFormat
 from vnca.io.film import FilmWriter
+from vnca.io.smoke_format import NO_VELOCITY
 from vnca.rendering.film import Picture, render, require_renderer
 from vnca.rendering.light import Light, LightVolume, spacing_for
+from vnca.rendering.shutter import blurred
 
 _RAISED, _LOWERED = 0.8, 0.4
 # Interleaved gradient noise: neighbouring pixels are spread evenly over a step.
@@ -71,6 +74,9 @@ class FilmConfig(Shot):
     """How far above the horizon it stands, degrees."""
     ambient: float = 0.15
     """Part of the light that comes from everywhere, 0 to 1: how bright shadows are."""
+    shutter: float = 0.0
+    """Motion blur: the part of a frame for which the shutter is open, 0 to 1; film cameras have
+    0.5. It takes smoke with a velocity."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -88,10 +94,16 @@ class FilmConfig(Shot):
             )
         if not 0 <= self.ambient <= 1:
             raise OptionError(f"`film.ambient` {self.ambient}: must be 0 to 1")
+        if not 0 <= self.shutter <= 1:
+            raise OptionError(f"`film.shutter` {self.shutter}: must be 0 to 1")
         if not self.light:
             for name in ("light_azimuth", "light_elevation", "ambient"):
                 if getattr(self, name) != getattr(FilmConfig, name):
                     raise OptionError(f"`film.{name}`: changes nothing where `film.light` is 0")
+
+    def reading(self, format: SmokeFormat) -> SmokeFormat:
+        """How smoke is read to be filmed: without a velocity unless motion is blurred."""
+        return format if self.shutter else replace(format, velocity_grid=NO_VELOCITY)
 
 
 class Shown(NamedTuple):
@@ -158,13 +170,16 @@ class Film:
         """Finish the film, or drop it if something failed."""
         self._writer.__exit__(kind, error, trace)
 
-    def add(self, frame: Shown) -> None:
-        """Render the next frame and add it."""
+    def add(self, frame: Shown, *, still: bool = False) -> None:
+        """Render the next frame and add it; `still` if its smoke does not move."""
+        turns = self._config.turn / self._frames
         view = picture(
             frame,
             self._config,
             bounds=self._bounds,
-            turned=self._config.turn * self._shown / self._frames,
+            turned=turns * self._shown,
+            turns=turns,
+            still=still,
             device=self._device,
         )
         self._writer.add(view.over(self._background))
@@ -185,22 +200,41 @@ def picture(
     *,
     bounds: Bounds,
     turned: float,
+    turns: float = 0.0,
+    still: bool = False,
     device: str = "cpu",
 ) -> Picture:
-    """The view of one frame by a camera framed on `bounds` that has turned by some degrees."""
+    """The view of one frame by a camera framed on `bounds`.
+
+    Args:
+        frame: The frame.
+        config: How it is filmed.
+        bounds: What to keep in view.
+        turned: Degrees by which the camera has turned.
+        turns: And by which it turns until the next frame.
+        still: Whether the smoke stays as it is until then.
+        device: Where to render.
+
+    Raises:
+        SequenceError: If motion is to be blurred and the smoke has no velocity.
+    """
     density, colour, place = frame.smoke.density, frame.colour, frame.smoke.cells_to_world
     # In lengths of a cell, single precision has room for a world of any size.
     thinnest = _thinnest(place)
     place = np.diag([1 / thinnest] * 3 + [1.0]) @ place
     lower, upper = ((corner / thinnest).tolist() for corner in bounds)
-    camera = frame_box(
-        lower,
-        upper,
-        config.azimuth + turned,
-        config.elevation,
-        aspect=config.columns / config.rows,
-        field_of_view=config.field_of_view or None,
+    camera, later = (
+        frame_box(
+            lower,
+            upper,
+            config.azimuth + angle,
+            config.elevation,
+            aspect=config.columns / config.rows,
+            field_of_view=config.field_of_view or None,
+        )
+        for angle in (turned, turned + turns)
     )
+    is_moving = config.shutter > 0 and density.any()
     if density.size == 0:
         density, colour = np.zeros((1, 1, 1), np.float32), np.zeros((1, 1, 1, 3), np.float32)
     gamma = frame.extinction * thinnest
@@ -219,7 +253,7 @@ def picture(
             spacing=spacing_for(*bounds) / thinnest,
             origin=frame.smoke.origin,
         )
-    return render(
+    seen = render(
         density,
         colour,
         camera,
@@ -231,6 +265,27 @@ def picture(
         light=light,
         device=device,
     )
+    if not is_moving:
+        return seen
+    return blurred(
+        seen,
+        density,
+        np.zeros((*density.shape, 3), np.float32) if still else _velocity(frame),
+        camera,
+        later,
+        shutter=config.shutter,
+        gamma=gamma,
+        step=config.step,
+        cells_to_world=place,
+        device=device,
+    )
+
+
+def _velocity(frame: Shown) -> FloatArray:
+    velocity = frame.smoke.velocity
+    if velocity is None:
+        raise SequenceError(f"frame {frame.smoke.frame}: no velocity, which `film.shutter` needs")
+    return velocity
 
 
 def _thinnest(cells_to_world: AnyArray) -> float:

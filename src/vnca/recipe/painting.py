@@ -21,7 +21,7 @@ from vnca.io import SmokeFormat, read_smoke, with_fitted_scale
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.painted import read_colour
 from vnca.io.parts import smoke_cells
-from vnca.io.provenance import read_provenance
+from vnca.io.provenance import as_told, read_provenance
 from vnca.io.sequence import FrameSequence
 from vnca.io.smoke_format import NO_VELOCITY, up_axis_of
 from vnca.painting import Roll, StylizeConfig
@@ -366,10 +366,12 @@ def _film(options: StylizeRun, painter: Painter, stack: ExitStack, watch: Watch)
 def read_painted(path: Path, source: Path, options: StylizeRun) -> Shown:
     """A painted frame as its file has it: the film is the same with `resume`, and by `render`."""
     up = up_axis_of(source, options.smoke)
-    format = dataclasses.replace(options.smoke, velocity_grid=NO_VELOCITY, up_axis=up)
-    smoke, told = read_smoke(path, format), read_provenance(path)
-    colour = read_colour(path, format, grid=options.colour_grid[0], box=smoke.box)
+    told = read_provenance(path)
     assert told is not None, "it was written a moment ago"
+    # A factor that was fitted is told as the number it came to.
+    format = as_told(SmokeFormat(options.smoke.density_grid, up_axis=up), told)
+    smoke = read_smoke(path, options.film.reading(format))
+    colour = read_colour(path, format, grid=options.colour_grid[0], box=smoke.box)
     assert colour is not None, "it was written a moment ago"
     return Shown(smoke, colour, told.extinction)
 

@@ -22,7 +22,7 @@ from vnca.core.lattice import Region
 from vnca.features import load_network
 from vnca.io import SmokeFormat, with_fitted_scale, write_painted
 from vnca.io.picture import read_style
-from vnca.io.provenance import Provenance
+from vnca.io.provenance import Provenance, velocity_of
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.io.smoke_format import up_axis_of
 from vnca.peers import Clip, Look, Settings
@@ -174,7 +174,8 @@ def _provenance(
         "refine": 1,
         "seed": settings.seed,
     }
-    return Provenance(gamma / scale / region.lattice.spacing, gamma, "z", facts)
+    extinction = gamma / scale / region.lattice.spacing
+    return Provenance(extinction, gamma, "z", facts, velocity_of(options.smoke))
 
 
 def _written(

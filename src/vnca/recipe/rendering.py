@@ -13,7 +13,7 @@ import numpy as np
 from vnca.core import FloatArray
 from vnca.core.errors import OptionError, SequenceError
 from vnca.core.files import existing_file, writable_file
-from vnca.core.records import changed, changed_fields
+from vnca.core.records import changed, changed_fields, with_values
 from vnca.engine import device_named
 from vnca.io import SmokeFormat
 from vnca.io.film import SUFFIXES as FILMS
@@ -21,9 +21,8 @@ from vnca.io.film import contact_sheet
 from vnca.io.painted import read_colour
 from vnca.io.picture import SUFFIXES as PICTURES
 from vnca.io.picture import write_image
-from vnca.io.provenance import read_provenance
+from vnca.io.provenance import as_told, read_provenance, velocity_of
 from vnca.io.sequence import FrameSequence
-from vnca.io.smoke_format import NO_VELOCITY, UpAxis
 from vnca.recipe import SILENT, Watch, tracked
 from vnca.recipe.film import Bounds, Film, FilmConfig, Shown, behind, picture
 from vnca.recipe.sequence import open_sequence, region_bounds, sequence_bounds, volumes
@@ -58,11 +57,9 @@ class RenderRun:
     """Put so many frames, evenly spaced, side by side into one picture."""
     transparent: bool = False
     """Leave the background out of pictures (png, exr)."""
-    density_grid: str = "density"
-    """Name of the density grid."""
-    up_axis: UpAxis | None = None
-    """Which axis of the file points up; as a painted file tells, else z in VDB files and y in npz
-    files, unless given."""
+    smoke: SmokeFormat = field(default_factory=SmokeFormat)
+    """How smoke is read from files. Painted ones tell which axis points up and how their velocity
+    is read, unless that is given."""
     device: str = "auto"
     """Where: auto, cpu, cuda, or as cuda:1."""
     film: FilmConfig = field(default_factory=FilmConfig)
@@ -102,19 +99,15 @@ class RenderRun:
                 raise OptionError(f"`film.{name}`: a picture has none; `out` {self.out}")
         if self.transparent and "background" in given:
             raise OptionError("`film.background`, `transparent`: one of them, not both")
+        if self.smoke.fields:
+            raise OptionError("`fields`: pictures show none")
+        if not self.film.shutter and (idle := velocity_of(self.smoke)):
+            raise OptionError(f"`{next(iter(idle))}`: changes nothing where `film.shutter` is 0")
 
     @property
     def is_film(self) -> bool:
         """Whether the output is a film rather than pictures."""
         return self.out.suffix.lower() in FILMS
-
-    @property
-    def smoke(self) -> SmokeFormat:
-        """How files are read, without a velocity: nothing here needs one."""
-        # Beside a refined painting it would have coarser cells.
-        return SmokeFormat(
-            density_grid=self.density_grid, velocity_grid=NO_VELOCITY, up_axis=self.up_axis
-        )
 
 
 def render(
@@ -128,10 +121,9 @@ def render(
     strip: int = 0,
     transparent: bool = False,
     film: FilmConfig | Mapping[str, Any] | None = None,
-    density_grid: str = "density",
-    up_axis: UpAxis | None = None,
     device: str = "auto",
     watch: Watch = SILENT,
+    **options: Any,
 ) -> Path:
     """Make a film, or pictures, of a sequence, painted or not, as `vnca render` does.
 
@@ -145,11 +137,10 @@ def render(
         strip: Put so many frames, evenly spaced, side by side into one picture.
         transparent: Leave the background out of pictures.
         film: The camera: a `FilmConfig`, or some of its fields, as `{"rows": 512}`.
-        density_grid: The grid of the density in files.
-        up_axis: Which axis of the files points up; as painted files tell, else by their suffix,
-            unless given.
         device: Where to compute: `auto`, `cpu`, `cuda`, or such as `cuda:1`.
         watch: Is told how far it has come, and may cancel.
+        **options: Fields of `SmokeFormat`; painted files tell which axis points up and how their
+            velocity is read, unless that is given.
 
     Returns:
         `out`.
@@ -166,8 +157,7 @@ def render(
         turntable=turntable,
         strip=strip,
         transparent=transparent,
-        density_grid=density_grid,
-        up_axis=up_axis,
+        smoke=with_values(SmokeFormat(), options),
         device=device,
         film=changed("film", FilmConfig(), film),
     )
@@ -181,8 +171,9 @@ def render(
 
 def _render_frames(given: Sequence[PaintedFrame], options: RenderRun, watch: Watch) -> None:
     """Render frames in memory."""
-    of_files = ("strip", "gamma", "frames", "colour_grid", "density_grid", "up_axis")
-    plain = dataclasses.replace(options, **{name: getattr(RenderRun, name) for name in of_files})
+    of_files = ("strip", "gamma", "frames", "colour_grid")
+    plain = {name: getattr(RenderRun, name) for name in of_files}
+    plain = dataclasses.replace(options, **plain, smoke=SmokeFormat())
     if idle := changed_fields(options, plain):
         raise OptionError(f"`{idle[0]}`: needs a sequence in files")
     _require_enough_names(len(given), options)
@@ -209,9 +200,9 @@ def run(options: RenderRun, watch: Watch) -> None:
         watch.made("rendered", options.out)
         return
     _require_enough_names(len(sequence), options)
-    options = _as_painted(options, sequence)
-    bounds = sequence_bounds(sequence, options.smoke)
-    shown = tracked(_frames(sequence, options), watch, "rendering", len(sequence), "frames")
+    format = _as_painted(options, sequence)
+    bounds = sequence_bounds(sequence, format)
+    shown = tracked(_frames(sequence, options, format), watch, "rendering", len(sequence), "frames")
     _write(shown, len(sequence), bounds, options)
     watch.made("rendered", options.out)
 
@@ -235,22 +226,19 @@ def strip(sequence: FrameSequence, options: RenderRun, count: int) -> list[Float
     """Pictures, linear RGB `[rows, columns, 3]`, of `count` frames evenly spaced in a sequence."""
     picked = sorted({round(at) for at in np.linspace(0, len(sequence) - 1, count)})
     some = FrameSequence(tuple(sequence[at] for at in picked))
-    options = _as_painted(options, sequence)
-    bounds = sequence_bounds(sequence, options.smoke)
-    return [_picture(frame, bounds, options) for frame in _frames(some, options)]
+    format = _as_painted(options, sequence)
+    bounds = sequence_bounds(sequence, format)
+    return [_picture(frame, bounds, options) for frame in _frames(some, options, format)]
 
 
-def _as_painted(options: RenderRun, sequence: FrameSequence) -> RenderRun:
-    """With the axis that points up as the files tell it, unless it is given."""
+def _as_painted(options: RenderRun, sequence: FrameSequence) -> SmokeFormat:
+    """How smoke is read: as painted files tell, but for what is given."""
     told = read_provenance(existing_file(sequence[0].path))
-    if told is None or options.up_axis is not None:
-        return options
-    return dataclasses.replace(options, up_axis=told.up_axis)
+    return options.film.reading(as_told(options.smoke, told) if told else options.smoke)
 
 
-def _frames(sequence: FrameSequence, options: RenderRun) -> Iterator[Shown]:
+def _frames(sequence: FrameSequence, options: RenderRun, seen: SmokeFormat) -> Iterator[Shown]:
     chosen: float | None = None  # one for all frames that do not tell, or brightness flickers
-    seen = options.smoke
     for frame, smoke in zip(sequence, volumes(sequence, seen), strict=True):
         colour = read_colour(frame.path, seen, grid=options.colour_grid, box=smoke.box)
         told = read_provenance(frame.path)
@@ -271,7 +259,7 @@ def _film(shown: Iterator[Shown], frames: int, bounds: Bounds, options: RenderRu
     with Film(options.out, config, bounds, frames=frames * repeats, device=place) as film:
         for frame in shown:
             for _ in range(repeats):
-                film.add(frame)
+                film.add(frame, still=repeats > 1)
 
 
 def _pictures(shown: Iterator[Shown], bounds: Bounds, options: RenderRun) -> None:

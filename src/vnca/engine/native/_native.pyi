@@ -188,6 +188,9 @@ def film(
     threads: int,
     /,
 ) -> None: ...
+def smear(
+    picture: FloatArray, way: FloatArray, count: int, still: float, to: FloatArray, threads: int
+) -> None: ...
 def composite(
     starts: IntArray,
     density: FloatArray,

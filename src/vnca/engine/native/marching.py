@@ -139,6 +139,24 @@ class Marcher:
         return pixels, passes
 
 
+def smeared(picture: FloatArray, way: FloatArray, count: int, still: float) -> FloatArray:
+    """Means of a picture along ways through its pixels, as `vnca.rendering.shutter.smeared` has it.
+
+    Args:
+        picture: `[rows, columns, 4]`.
+        way: `[rows, columns, 2]`, pixels.
+        count: Of the places on a way.
+        still: Pixels with a shorter way stay as they are.
+
+    Raises:
+        BackendUnavailableError: If the extension was not built.
+        ShapeError: If arrays are not contiguous, or of other shapes or types.
+    """
+    result = np.empty_like(picture)
+    checked("smearing", extension().smear, picture, way, count, still, result, default_threads())
+    return result
+
+
 class Shading(NamedTuple):
     """What the samples of rays show.
 

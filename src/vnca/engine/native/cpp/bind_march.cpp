@@ -16,6 +16,7 @@
 #include "arrays.hpp"
 #include "film.hpp"
 #include "march.hpp"
+#include "smear.hpp"
 
 namespace vnca {
 namespace {
@@ -144,6 +145,22 @@ void bind_march(nb::module_& m) {
         check_apart({to_colour, passes}, inputs);
         nb::gil_scoped_release released;
         film(smoke, hue, light ? &*light : nullptr, along, pixels, through, threads);
+    });
+
+    m.def("smear", [](Input picture, Input way, std::int64_t count, float still, Output to, int threads) {
+        const std::int64_t rows = length(picture, 0), columns = length(picture, 1);
+        const float* const from = data_of<float>(picture, "picture", {ANY, ANY, CHANNELS});
+        const float* const ways = data_of<float>(way, "ways", {rows, columns, 2});
+        float* const smeared = data_of<float>(to, "smeared picture", {rows, columns, CHANNELS});
+        in_range("rows", rows, 1, INT32_MAX);
+        in_range("columns", columns, 1, INT32_MAX);
+        in_range("places on a way", count, 1, INT32_MAX);
+        bool finite = true;
+        for (std::int64_t i = 0; i < 2 * rows * columns; ++i) finite &= std::isfinite(ways[i]);
+        if (!finite) throw nb::value_error("ways: expected finite numbers");
+        check_apart({to}, {picture, way});
+        nb::gil_scoped_release released;
+        smear(from, ways, rows, columns, count, still, smeared, threads);
     });
 
     m.def("composite", [](Input starts, Input density, Input colour, Input depth, float extinction,
