@@ -138,9 +138,8 @@ def interpolated(picture: FloatArray, places: FloatArray) -> FloatArray:
     last = np.array(picture.shape[:2], np.float32) - 1
     places = np.clip(places, 0, last)
     low = np.minimum(np.floor(places), np.maximum(last - 1, 0)).astype(np.int64)
-    (down, right), (row, column) = (places - low).astype(np.float32).T[..., None], low.T
-    below, beside = np.minimum(row + 1, last[0]).astype(int), np.minimum(column + 1, last[1])
-    beside = beside.astype(int)
+    (row, column), (below, beside) = low.T, np.minimum(low + 1, last).astype(np.int64).T
+    down, right = (places - low).astype(np.float32).T[..., None]
     upper = picture[row, column] * (1 - right) + picture[row, beside] * right
     lower = picture[below, column] * (1 - right) + picture[below, beside] * right
     return upper * (1 - down) + lower * down
