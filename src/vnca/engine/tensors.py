@@ -118,7 +118,7 @@ def require_equal_runs(device: torch.device) -> None:
             f"{WORKSPACE} {workspace}: runs would differ; set it to {' or '.join(WORKSPACES)}, or "
             "not at all"
         )
-    # As `use_deterministic_algorithms`, which imports the compiler of torch, seconds of every start.
+    # `use_deterministic_algorithms` would import torch's compiler, which takes seconds.
     torch.set_deterministic_debug_mode("error")
     # It would fill what is about to be written, which takes a twentieth of a training.
     deterministic.fill_uninitialized_memory = False  # pyright: ignore[reportAttributeAccessIssue]
