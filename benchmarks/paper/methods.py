@@ -30,7 +30,7 @@ class Methods(Study):
 
     methods: tuple[str, ...] = ("vnca", "aurand", "lnst", "tnst")
     """As `vnca compare --methods` has it."""
-    resolution: int = 48
+    resolution: int = 32
     """Cells across the scene; the paper has 200."""
     count: int = 20
     """Frames painted."""
