@@ -121,8 +121,7 @@ def comparison(rows: Rows) -> list[str]:
         lines.append(f"| {method} | {' | '.join([*theirs, *values, MISSING])} |")
     where = f"Ours: {', '.join(grids)} cells, on a CPU." if grids else f"Ours: {MISSING} so far."
     where += (
-        " Figures on other smoke: "
-        "[other methods](guide/peers.md#what-a-comparison-shows-so-far)."
+        " Figures on other smoke: [other methods](guide/peers.md#what-a-comparison-shows-so-far)."
     )
     return [*lines, "", where]
 
