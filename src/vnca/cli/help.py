@@ -29,15 +29,8 @@ ASKED = ("-h", "--help", "--help-all")
 """What asks for help."""
 _SMOKE = ("velocity-units", "fps", "up-axis")
 _FILM = (
-    "azimuth",
-    "elevation",
-    "turn",
-    "rows",
-    "columns",
-    "film-fps",
-    "background",
-    "light",
-    "shutter",
+    *("azimuth", "elevation", "turn", "rows", "columns", "film-fps", "background"),
+    *("light", "shutter"),
 )
 _PEER = ("out", "frames", "features", "overwrite", *_SMOKE)
 _PEERS = ("iterations", "gamma", "enlarged", "whole-picture", "seed")

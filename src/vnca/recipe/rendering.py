@@ -15,7 +15,7 @@ from vnca.core.errors import OptionError, SequenceError
 from vnca.core.files import existing_file, writable_file
 from vnca.core.records import changed, changed_fields, with_values
 from vnca.engine import device_named
-from vnca.io import SmokeFormat
+from vnca.io import SmokeFormat, with_fitted_scale
 from vnca.io.film import SUFFIXES as FILMS
 from vnca.io.film import contact_sheet
 from vnca.io.painted import read_colour
@@ -234,7 +234,8 @@ def strip(sequence: FrameSequence, options: RenderRun, count: int) -> list[Float
 def _as_painted(options: RenderRun, sequence: FrameSequence) -> SmokeFormat:
     """How smoke is read: as painted files tell, but for what is given."""
     told = read_provenance(existing_file(sequence[0].path))
-    return options.film.reading(as_told(options.smoke, told) if told else options.smoke)
+    format = options.film.reading(as_told(options.smoke, told) if told else options.smoke)
+    return with_fitted_scale(format, sequence)
 
 
 def _frames(sequence: FrameSequence, options: RenderRun, seen: SmokeFormat) -> Iterator[Shown]:
