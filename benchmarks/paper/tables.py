@@ -155,7 +155,8 @@ def ablations(rows: Rows) -> list[str]:
 def tables(rows: Rows) -> str:
     """All three, as Markdown."""
     parts = [
-        "**Table 1**, what methods can. + and − are the paper's; figures are ours.",
+        "**Table 1**, what methods can. + and − are the paper's; figures are ours, on the "
+        "smoke of Table 2, which is smaller.",
         "",
         *traits(rows),
         "",
