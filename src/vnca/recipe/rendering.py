@@ -173,8 +173,9 @@ def _render_frames(given: Sequence[PaintedFrame], options: RenderRun, watch: Wat
     """Render frames in memory."""
     of_files = ("strip", "gamma", "frames", "colour_grid")
     plain = {name: getattr(RenderRun, name) for name in of_files}
-    plain = dataclasses.replace(options, **plain, smoke=SmokeFormat())
-    if idle := changed_fields(options, plain):
+    plain = dataclasses.replace(options, **plain)
+    idle = changed_fields(options.smoke, SmokeFormat()) + changed_fields(options, plain)
+    if idle:
         raise OptionError(f"`{idle[0]}`: needs a sequence in files")
     _require_enough_names(len(given), options)
     writable_file(options.out)
