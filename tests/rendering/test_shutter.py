@@ -65,7 +65,8 @@ def test_cells_move_from_where_they_are_seen_to_where_they_are_seen_next(
 ) -> None:
     camera, later = (camera_of(place, side[0] + turn, *side[1:]) for turn in (0.0, 5.0))
     velocity = np.random.default_rng(3).normal(size=(*SHAPE, 3)).astype(np.float32)
-    moved = screen_motion(velocity, camera, later, place)
+    density = np.ones(SHAPE, np.float32)
+    moved = screen_motion(density, velocity, (camera, later), place)
     cell = np.array([7, 2, 5])
     matrix = np.eye(4) if place is None else place
     ends = []
@@ -73,7 +74,7 @@ def test_cells_move_from_where_they_are_seen_to_where_they_are_seen_next(
         row, column, _ = seen_by.project(matrix[:3, :3] @ at + matrix[:3, 3], 500, 700)
         ends.append(np.array([row, column]))
     np.testing.assert_allclose(
-        500 * moved[tuple(cell)][:2], ends[1] - ends[0], rtol=1e-3, atol=0.01
+        500 * moved[tuple(cell)][1::-1], ends[1] - ends[0], rtol=1e-3, atol=0.01
     )
     assert not moved[..., 2].any()
 

@@ -76,6 +76,38 @@ def rays_in_cells(
     return (origins - cells_to_world[:3, 3]) @ to_cells.T, directions @ to_cells.T
 
 
+def moved_cells(
+    cells: AnyArray,
+    velocity: AnyArray,
+    cameras: tuple[Camera, Camera],
+    rows: int,
+    columns: int,
+    cells_to_world: AnyArray | None,
+) -> AnyArray:
+    """How far cells move in a picture until the next frame.
+
+    Args:
+        cells: `[n, 3]`, cell coordinates.
+        velocity: `[n, 3]`, cells per frame.
+        cameras: Where they are seen from, in the space that `cells_to_world` leads to; and from
+            where a frame later.
+        rows: Height of the picture, pixels.
+        columns: Width of the picture, pixels.
+        cells_to_world: 4×4, affine; the same space unless given.
+
+    Returns:
+        `[n, 2]`, pixels to the right and down; zero where a camera does not see the cell before it.
+    """
+    place = np.eye(4) if cells_to_world is None else cells_to_world
+    start = cells.astype(np.float64)
+    (row, column, _), (row_after, column_after, _) = (
+        camera.project(points @ place[:3, :3].T + place[:3, 3], rows, columns)
+        for camera, points in zip(cameras, (start, start + velocity), strict=True)
+    )
+    # Behind a pinhole there is no picture.
+    return np.nan_to_num(np.stack([column_after - column, row_after - row], axis=-1))
+
+
 def staggered(offset: float, along: int, rows: int, columns: int) -> AnyArray:
     """Where the samples of `along` × `along` rays of each pixel begin, in steps, row by row."""
     of_pixel = (offset + _STAGGER * np.arange(along**2)).reshape(along, along) % 1

@@ -16,6 +16,7 @@ from vnca.core import AnyArray, FloatArray
 from vnca.core.camera import Camera
 from vnca.engine import native
 from vnca.engine.native.marching import smeared as natively_smeared
+from vnca.rendering import moved_cells
 from vnca.rendering.film import Picture, render
 
 COARSER = 4
@@ -30,31 +31,28 @@ _FARTHEST = 1.0
 
 
 def screen_motion(
-    velocity: FloatArray, camera: Camera, later: Camera, cells_to_world: AnyArray | None = None
+    density: FloatArray,
+    velocity: FloatArray,
+    cameras: tuple[Camera, Camera],
+    cells_to_world: AnyArray | None = None,
 ) -> FloatArray:
-    """How far cells move in a picture until the next frame.
+    """How far smoke moves in a picture until the next frame.
 
     Args:
+        density: `[x, y, z]`.
         velocity: `[x, y, z, 3]` at cell centres, cells per frame.
-        camera: Where they are seen from, in the space that `cells_to_world` leads to.
-        later: And from where a frame later.
+        cameras: Where it is seen from, in the space that `cells_to_world` leads to; and from where
+            a frame later.
         cells_to_world: 4×4, affine; the same space unless given.
 
     Returns:
-        `[x, y, z, 3]`, down, to the right, and zero, in heights of the picture; zero where a
-        camera does not see the cell before it.
+        `[x, y, z, 3]`, to the right, down, and zero, in heights of the picture; zero where there is
+        no smoke, or a camera does not see the cell before it.
     """
-    place = np.eye(4) if cells_to_world is None else cells_to_world
     moved = np.zeros(velocity.shape, np.float32)
-    at = np.moveaxis(np.indices(velocity.shape[1:3]), 0, -1).astype(np.float64)
-    for x, flow in enumerate(velocity):  # one layer at a time: cells may be many
-        here = np.concatenate([np.full((*at.shape[:2], 1), float(x)), at], axis=-1)
-        ends = []
-        for seen_by, cells in ((camera, here), (later, here + flow)):
-            row, column, _ = seen_by.project(cells @ place[:3, :3].T + place[:3, 3], 1, 1)
-            ends.append(np.stack([row, column], axis=-1))
-        step = np.nan_to_num(ends[1] - ends[0], nan=0.0, posinf=0.0, neginf=0.0)
-        moved[x, ..., :2] = np.clip(step, -_FARTHEST, _FARTHEST)
+    smoke = np.nonzero(density > 0)
+    moves = moved_cells(np.stack(smoke, axis=-1), velocity[smoke], cameras, 1, 1, cells_to_world)
+    moved[(*smoke, slice(2))] = np.clip(moves, -_FARTHEST, _FARTHEST)
     return moved
 
 
@@ -89,7 +87,7 @@ def blurred(
     coarse = max(1, rows // COARSER)
     moving = render(
         density,
-        screen_motion(velocity, camera, later, cells_to_world),
+        screen_motion(density, velocity, (camera, later), cells_to_world),
         camera,
         rows=coarse,
         columns=max(1, round(coarse * columns / rows)),
@@ -146,8 +144,11 @@ def interpolated(picture: FloatArray, places: FloatArray) -> FloatArray:
 
 
 def _spread(moving: Picture, shutter: float) -> FloatArray:
-    """The motion of pixels `[rows, columns, 2]`, and around smoke of those that may reach them."""
-    motion, opacity = moving.colour[..., :2], moving.opacity[..., None]
+    """The motion of pixels `[rows, columns, 2]`, down and to the right.
+
+    Around smoke it is that of the smoke that may reach them.
+    """
+    motion, opacity = moving.colour[..., 1::-1], moving.opacity[..., None]
     longest = np.sqrt((motion**2).sum(-1) / np.maximum(moving.opacity, _FAINT) ** 2).max()
     reach = math.ceil(0.5 * shutter * float(longest) * len(motion)) + 1
     motion = motion + _FAINT * _boxed(motion, reach)

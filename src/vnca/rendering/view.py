@@ -21,6 +21,7 @@ from vnca.rendering import (
     averaged,
     check_view,
     march,
+    moved_cells,
     native,
     rays_in_cells,
     staggered,
@@ -312,32 +313,18 @@ def projected_velocity(
     smoke = torch.nonzero(density > 0)
     there = tuple(smoke.T)
     moved = density.new_zeros(*density.shape, 3)
-    place = np.eye(4) if cells_to_world is None else cells_to_world
-    moved[there] = _pixels(smoke, velocity[there], camera, rows, columns, place)
+    moves = moved_cells(
+        smoke.cpu().numpy(),
+        velocity[there].cpu().numpy(),
+        (camera, camera),
+        rows,
+        columns,
+        cells_to_world,
+    )
+    # A camera sees the one as the sum of the weights of a ray, which makes the others a mean.
+    moves = np.concatenate([moves, np.ones((len(moves), 1))], axis=-1)
+    moved[there] = torch.from_numpy(moves).to(velocity)
     size: dict[str, Any] = {"rows": rows, "columns": columns}
     view = render(density, moved, camera, **size, cells_to_world=cells_to_world, **marching)
     weight = view.colour[..., 2:]
     return view.colour[..., :2] / weight.clamp_min(1e-6), view.opacity
-
-
-def _pixels(
-    cells: Tensor,
-    velocity: Tensor,
-    camera: Camera,
-    rows: int,
-    columns: int,
-    cells_to_world: AnyArray,
-) -> Float[Tensor, "n 3"]:
-    """How far cells move in the picture in a frame: right, down, and a one.
-
-    A camera sees the one as the sum of the weights of a ray, which makes the others a mean.
-    """
-    start = cells.cpu().numpy().astype(np.float64)
-    end = start + velocity.cpu().numpy()
-    linear, translation = cells_to_world[:3, :3], cells_to_world[:3, 3]
-    (row, column, _), (row_after, column_after, _) = (
-        camera.project(points @ linear.T + translation, rows, columns) for points in (start, end)
-    )
-    moved = np.stack([column_after - column, row_after - row, np.ones(len(start))], axis=-1)
-    # Behind a pinhole there is no picture.
-    return torch.from_numpy(np.nan_to_num(moved)).to(velocity)
