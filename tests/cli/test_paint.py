@@ -213,6 +213,12 @@ def test_strengths_say_how_much_of_the_painting_is_seen(
     assert not (tmp_path / "full" / "film.mp4").exists()
 
 
+def test_motion_that_cannot_be_blurred_is_said_before_training(job: Job) -> None:
+    done = job.run("--shutter", 0.5, "--velocity-grid", "none")
+    assert "no velocity, which --shutter needs" in done.complaint
+    assert not job.out.exists()
+
+
 def test_a_film_is_shaped_or_left_out(vnca: Vnca, smoke: Path, tmp_path: Path) -> None:
     given = (smoke, "--style", "ink", "-o", tmp_path / "out", "--without-film")
     assert "--rows, --without-film: one of them" in vnca("paint", *given, "--rows", 32).complaint

@@ -270,7 +270,7 @@ def picture(
     return blurred(
         seen,
         density,
-        np.zeros((*density.shape, 3), np.float32) if still else _velocity(frame),
+        np.zeros((*density.shape, 3), np.float32) if still else require_velocity(frame.smoke),
         camera,
         later,
         shutter=config.shutter,
@@ -281,11 +281,15 @@ def picture(
     )
 
 
-def _velocity(frame: Shown) -> FloatArray:
-    velocity = frame.smoke.velocity
-    if velocity is None:
-        raise SequenceError(f"frame {frame.smoke.frame}: no velocity, which `film.shutter` needs")
-    return velocity
+def require_velocity(smoke: Volume) -> FloatArray:
+    """The velocity of a frame, by which its motion is blurred.
+
+    Raises:
+        SequenceError: If it has none.
+    """
+    if smoke.velocity is None:
+        raise SequenceError(f"frame {smoke.frame}: no velocity, which `film.shutter` needs")
+    return smoke.velocity
 
 
 def _thinnest(cells_to_world: AnyArray) -> float:

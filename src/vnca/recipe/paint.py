@@ -15,14 +15,14 @@ from vnca.core.records import changed, changed_fields, distributed, fields_of
 from vnca.direction import Direction
 from vnca.direction.shot import SUFFIX as SHOT
 from vnca.direction.shot import Shot
-from vnca.io import SmokeFormat
+from vnca.io import SmokeFormat, read_smoke
 from vnca.io.film import usual_suffix
 from vnca.io.sequence import Frame, FrameSequence
 from vnca.painting import StylizeConfig
 from vnca.painting.chunk import Chunking
 from vnca.ranks import Alone, Ranks
 from vnca.recipe import SILENT, Watch, first_difference, painting, recorded, recorded_smoke
-from vnca.recipe.film import FilmConfig
+from vnca.recipe.film import FilmConfig, require_velocity
 from vnca.recipe.rendering import CELL_OPACITY
 from vnca.recipe.sequence import fullest_frame, open_sequence
 from vnca.rule.library import load_style, require_style
@@ -255,6 +255,10 @@ def run(options: PaintRun, watch: Watch, ranks: Ranks | None = None) -> Iterator
     if ranks.size > 1 and not paints:
         raise OptionError("mpirun: ranks share the painting alone; do it with `only` paint")
     sequence = open_sequence(options.sequence, options.frames, watch)
+    is_filmed = not options.without_film and options.only != "paint"
+    if is_filmed and options.film.shutter and not options.is_trained:
+        # Said before minutes of training, not after them.
+        require_velocity(read_smoke(_training_frame(options, sequence).path, options.smoke))
     goes_on = _begin(options)
     model, smoke, scales = options.picture or Path(options.name), options.smoke, painting.Scales()
     style = None
@@ -272,7 +276,6 @@ def run(options: PaintRun, watch: Watch, ranks: Ranks | None = None) -> Iterator
             raise
         # With the velocity's scale as it was fitted for the training.
         smoke = recorded_smoke(model, Model.load(model)) or smoke
-    is_filmed = not options.without_film and options.only != "paint"
     asked = painting.StylizeRun(
         model=model,
         sequence=options.sequence,
