@@ -25,6 +25,7 @@ def test_the_texture_is_of_the_rule_and_the_picture_that_smoke_is_trained_with()
     assert texture.rule.hidden == config.rule.hidden
     assert texture.decoder == config.decoder
     assert texture.rule.sobel_divisor == config.rule.sobel_divisor
+    assert 0 < texture.steadiness < 0.5 * config.steadiness  # or it stays what it began with
     assert texture.appearance.style_scale * texture.slice.cells == pytest.approx(60)
 
 

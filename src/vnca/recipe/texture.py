@@ -56,6 +56,9 @@ SHAPE = ("channels", "hidden", "update_probability", "sobel_divisor", "laplacian
 """In what a rule must be like the texture that it begins with."""
 LARGEST_PICTURE = 128
 """Cells along the shorter side of the picture, at most: its patterns are to fit the block."""
+STEADY = 0.2
+"""Part of the steadiness of smoke that a texture is taught: with all of it a texture keeps what it
+began with, and in few iterations it stays pale; with none, smoke teaches too little of it."""
 
 
 def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | None:
@@ -83,7 +86,7 @@ def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | N
         decoder=config.decoder,
         graft=config.graft,
         iterations=iterations,
-        steadiness=config.steadiness,
+        steadiness=STEADY * config.steadiness,
         features=config.features,
         backend=config.backend,
         seed=config.seed,
