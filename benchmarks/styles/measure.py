@@ -57,34 +57,34 @@ SPREAD, WARP = 0.08, 1.2
 def main() -> None:
     """Measure what is asked, and print the table."""
     asked = _asked()
-    known = _rows(asked.out)
+    known = rows_of(asked.out)
     for name in asked.styles or style_names():
         if name not in known:
-            known[name] = measured(name, asked)
-            _write(asked.out, known)
+            model = (
+                load_style(name)
+                if asked.models is None
+                else Model.load(asked.models / f"{name}.safetensors")
+            )
+            style = picture(str(model.training["style"]), asked.pictures)
+            known[name] = {"style": name, **measured(model, style, asked)}
+            write_rows(asked.out, known)
             print(name, known[name]["seconds"], "s of processor time", file=sys.stderr, flush=True)
     print(table(known))
 
 
-def measured(name: str, asked: argparse.Namespace) -> dict[str, str]:
-    """A row: what is measured of one style."""
-    model = (
-        load_style(name)
-        if asked.models is None
-        else Model.load(asked.models / f"{name}.safetensors")
-    )
+def measured(model: Model, style: Path, asked: argparse.Namespace) -> dict[str, str]:
+    """A row: what is measured of one model, compared with its picture."""
     begun = time.process_time()
     found = vnca.evaluate(
         model,
         asked.smoke,
-        style=picture(str(model.training["style"]), asked.pictures),
+        style=style,
         frames=asked.frames,
         refine=asked.refine,
         **read_as(asked),
     )
     by_name = {measure.name: measure for measure in found.measures}
     row = {
-        "style": name,
         "frames": asked.frames,
         "refine": str(asked.refine),
         "seconds": f"{time.process_time() - begun:.0f}",
@@ -146,14 +146,16 @@ def _more(measure: Measure, name: str) -> float | None:
     return None if value is None else float(value)
 
 
-def _rows(path: Path) -> dict[str, dict[str, str]]:
+def rows_of(path: Path) -> dict[str, dict[str, str]]:
+    """What is measured already, by style."""
     if not path.exists():
         return {}
     with path.open(newline="") as stream:
         return {row["style"]: dict(row) for row in csv.DictReader(stream)}
 
 
-def _write(path: Path, rows: dict[str, dict[str, str]]) -> None:
+def write_rows(path: Path, rows: dict[str, dict[str, str]]) -> None:
+    """Write them, in the order of their styles."""
     with path.open("w", newline="") as stream:
         writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
         writer.writeheader()

@@ -1,9 +1,10 @@
 """A sheet of what rules make of their pictures: each picture, and smoke painted from four sides.
 
-    python benchmarks/styles/sheet.py SMOKE OUT.png [OPTIONS] PICTURE=RUN [PICTURE=RUN ...]
+    python benchmarks/styles/sheet.py SMOKE OUT.png [OPTIONS] PICTURE=RUN[=RUN …] [PICTURE=RUN …]
 
 Paints the last of some frames with the model of each RUN and films it as `vnca render` does, lit,
-from the front, the right, behind and above, at 512 pixels each.
+from the front, the right, behind and above, at 512 pixels each; runs of a picture stand beside each
+other.
 """
 
 import argparse
@@ -29,11 +30,13 @@ def main() -> None:
     asked = _asked()
     rows = []
     for pair in asked.runs:
-        picture, run = pair.split("=", 1)
-        *_, last = vnca.stylize(
-            run, asked.smoke, frames=asked.frames, refine=asked.refine, **read_as(asked)
-        )
-        rows.append([_squared(read_image(picture)), *(seen(last, *side) for side in SIDES)])
+        picture, *runs = pair.split("=")
+        rows.append([_squared(read_image(picture))])
+        for run in runs:
+            *_, last = vnca.stylize(
+                run, asked.smoke, frames=asked.frames, refine=asked.refine, **read_as(asked)
+            )
+            rows[-1] += [seen(last, *side) for side in SIDES]
         vnca.write_image(asked.out, np.concatenate([np.concatenate(row, axis=1) for row in rows]))
         print(picture, flush=True)
 
@@ -62,7 +65,7 @@ def _asked() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("smoke")
     parser.add_argument("out", type=Path)
-    parser.add_argument("runs", nargs="+", help="PICTURE=RUN")
+    parser.add_argument("runs", nargs="+", help="PICTURE=RUN[=RUN …]")
     add_reading(parser, frames="42-45", refine=2)
     return parser.parse_args()
 

@@ -1,0 +1,51 @@
+"""What `vnca evaluate` says of models beside each other: of the same picture, on the same smoke.
+
+    python benchmarks/styles/beside.py SMOKE OUT.csv [OPTIONS] PICTURE=RUN[=RUN …] [PICTURE=RUN …]
+
+All runs of a picture are compared with it as large, in cells, as the last of them was shown it: a
+picture shown smaller is another picture, with other strokes. What is measured already in OUT.csv is
+not measured again. At the end the table is printed in Markdown.
+"""
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from measure import add_reading, measured, rows_of, table, write_rows
+
+from vnca.recipe import PICTURE_CELLS
+from vnca.rule.model import MODEL_NAME, Model
+
+
+def main() -> None:
+    """Measure what is missing, and print the table."""
+    asked = _asked()
+    known = rows_of(asked.out)
+    for given in asked.runs:
+        style, *runs = map(Path, given.split("="))
+        cells = Model.load(runs[-1] / MODEL_NAME).training[PICTURE_CELLS]
+        for run in runs:
+            name = f"{style.stem}, {run.parent.name}"
+            if name in known:
+                continue
+            model = Model.load(run / MODEL_NAME)
+            shown = replace(model, training={**model.training, PICTURE_CELLS: cells})
+            known[name] = {"style": name, **measured(shown, style, asked)}
+            write_rows(asked.out, known)
+            print(name, known[name]["seconds"], "s of processor time", file=sys.stderr, flush=True)
+    print(table(known))
+
+
+def _asked() -> argparse.Namespace:
+    assert __doc__ is not None
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("smoke")
+    parser.add_argument("out", type=Path)
+    parser.add_argument("runs", nargs="+", help="PICTURE=RUN[=RUN …]")
+    add_reading(parser, frames="36-47", refine=1)
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()
