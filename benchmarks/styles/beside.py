@@ -12,7 +12,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from measure import add_reading, measured, rows_of, table, write_rows
+from measure import add_reading, add_size, measured, rows_of, table, write_rows
 
 from vnca.recipe import PICTURE_CELLS
 from vnca.rule.model import MODEL_NAME, Model
@@ -44,6 +44,7 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("out", type=Path)
     parser.add_argument("runs", nargs="+", help="PICTURE=RUN[=RUN …]")
     add_reading(parser, frames="36-47", refine=1)
+    add_size(parser)
     return parser.parse_args()
 
 

@@ -81,6 +81,7 @@ def measured(model: Model, style: Path, asked: argparse.Namespace) -> dict[str, 
         style=style,
         frames=asked.frames,
         refine=asked.refine,
+        size=asked.size,
         **read_as(asked),
     )
     by_name = {measure.name: measure for measure in found.measures}
@@ -179,6 +180,11 @@ def add_reading(parser: argparse.ArgumentParser, *, frames: str, refine: int) ->
     parser.add_argument("--velocity-scale", type=_number_or_fit, default=0.8)
 
 
+def add_size(parser: argparse.ArgumentParser) -> None:
+    """How large views are, pixels."""
+    parser.add_argument("--size", type=int, default=224)
+
+
 def read_as(asked: argparse.Namespace) -> dict[str, object]:
     """How smoke is read, as the library has it."""
     names = ("velocity_units", "fps", "time_scale", "velocity_scale")
@@ -196,6 +202,7 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("out", type=Path)
     parser.add_argument("styles", nargs="*", help="all unless given")
     parser.add_argument("--models", type=Path, help="a folder of others in the library's place")
+    add_size(parser)
     return parser.parse_args()
 
 

@@ -86,7 +86,7 @@ class EvaluateRun:
         if self.size < 64:
             raise OptionError(f"`size` {self.size}: at least 64 pixels are needed")
         if self.style_scale is not None:
-            _checked_size(self.size * self.style_scale, f"`style_scale` {self.style_scale:g}")
+            _checked_size(self.size * self.style_scale, "style_scale", self.style_scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +250,7 @@ def run(
     setup = Setup.around(given.read(None), rule, options.size)
     # A decoder leaves cells, and what is drawn in them, as large as they are.
     cells = 1 if rule.decoder is not None else refine
-    pixels = _checked_size(width(setup.refined(cells)), f"`size` {options.size}")
+    pixels = _checked_size(width(setup.refined(cells)), "size", options.size)
     setup, metric = setup.refined(refine), StyleMetric(picture, pixels)
     paintings = stylize(
         given.read(VelocityCheck(rule, options.smoke, watch.note)),
@@ -377,11 +377,13 @@ def _compared_width(options: EvaluateRun, model: Model) -> Callable[[Setup], flo
     return lambda setup: cells * setup.scale
 
 
-def _checked_size(pixels: float, option: str) -> int:
-    """The picture's shorter side where it is compared."""
+def _checked_size(pixels: float, name: str, value: float) -> int:
+    """The picture's shorter side where it is compared, which an option is in proportion to."""
     if not SMALLEST <= pixels <= LARGEST:
+        least = math.ceil(100 * value * SMALLEST / pixels) / 100
         raise OptionError(
-            f"{option}: makes the picture {pixels:.0f} pixels wide, of {SMALLEST} to {LARGEST}"
+            f"`{name}` {value:g}: makes the picture {pixels:.0f} pixels wide, of {SMALLEST} to "
+            f"{LARGEST}; {least:g} is the least"
         )
     return round(pixels)
 
