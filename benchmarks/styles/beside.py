@@ -7,12 +7,11 @@ picture shown smaller is another picture, with other strokes. What is measured a
 not measured again. At the end the table is printed in Markdown.
 """
 
-import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
 
-from measure import add_reading, add_size, measured, rows_of, table, write_rows
+from measure import add_size, measured, rows_of, runs_parser, table, write_rows
 
 from vnca.recipe import PICTURE_CELLS
 from vnca.rule.model import MODEL_NAME, Model
@@ -20,7 +19,9 @@ from vnca.rule.model import MODEL_NAME, Model
 
 def main() -> None:
     """Measure what is missing, and print the table."""
-    asked = _asked()
+    parser = runs_parser(__doc__, frames="36-47", refine=1)
+    add_size(parser)
+    asked = parser.parse_args()
     known = rows_of(asked.out)
     for given in asked.runs:
         style, *runs = map(Path, given.split("="))
@@ -35,17 +36,6 @@ def main() -> None:
             write_rows(asked.out, known)
             print(name, known[name]["seconds"], "s of processor time", file=sys.stderr, flush=True)
     print(table(known))
-
-
-def _asked() -> argparse.Namespace:
-    assert __doc__ is not None
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("smoke")
-    parser.add_argument("out", type=Path)
-    parser.add_argument("runs", nargs="+", help="PICTURE=RUN[=RUN …]")
-    add_reading(parser, frames="36-47", refine=1)
-    add_size(parser)
-    return parser.parse_args()
 
 
 if __name__ == "__main__":

@@ -170,6 +170,17 @@ def add_smoke(parser: argparse.ArgumentParser, *, frames: str, refine: int) -> N
     add_reading(parser, frames=frames, refine=refine)
 
 
+def runs_parser(about: str | None, *, frames: str, refine: int) -> argparse.ArgumentParser:
+    """Of a script about several runs of each picture; options as `add_reading` has them."""
+    assert about is not None
+    parser = argparse.ArgumentParser(description=about.splitlines()[0])
+    parser.add_argument("smoke")
+    parser.add_argument("out", type=Path)
+    parser.add_argument("runs", nargs="+", help="PICTURE=RUN[=RUN …]")
+    add_reading(parser, frames=frames, refine=refine)
+    return parser
+
+
 def add_reading(parser: argparse.ArgumentParser, *, frames: str, refine: int) -> None:
     """Options that say what of the smoke is painted, and how it is read."""
     parser.add_argument("--frames", default=frames)

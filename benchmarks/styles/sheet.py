@@ -7,11 +7,8 @@ from the front, the right, behind and above, at 512 pixels each; runs of a pictu
 other.
 """
 
-import argparse
-from pathlib import Path
-
 import numpy as np
-from measure import add_reading, read_as
+from measure import read_as, runs_parser
 
 import vnca
 from vnca.core import AnyArray
@@ -27,7 +24,7 @@ SIDES = ((0.0, 10.0), (90.0, 10.0), (180.0, 10.0), (0.0, 60.0))
 
 def main() -> None:
     """Write it, a row at a time."""
-    asked = _asked()
+    asked = runs_parser(__doc__, frames="42-45", refine=2).parse_args()
     rows = []
     for pair in asked.runs:
         picture, *runs = pair.split("=")
@@ -58,16 +55,6 @@ def _squared(picture: AnyArray) -> AnyArray:
     top, left = (SIZE - rows) // 2, (SIZE - columns) // 2
     square[top : top + rows, left : left + columns] = small
     return square
-
-
-def _asked() -> argparse.Namespace:
-    assert __doc__ is not None
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("smoke")
-    parser.add_argument("out", type=Path)
-    parser.add_argument("runs", nargs="+", help="PICTURE=RUN[=RUN …]")
-    add_reading(parser, frames="42-45", refine=2)
-    return parser.parse_args()
 
 
 if __name__ == "__main__":

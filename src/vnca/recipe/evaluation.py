@@ -381,9 +381,10 @@ def _checked_size(pixels: float, name: str, value: float) -> int:
     """The picture's shorter side where it is compared, which an option is in proportion to."""
     if not SMALLEST <= pixels <= LARGEST:
         least = math.ceil(100 * value * SMALLEST / pixels) / 100
+        most = math.floor(100 * value * LARGEST / pixels) / 100
         raise OptionError(
             f"`{name}` {value:g}: makes the picture {pixels:.0f} pixels wide, of {SMALLEST} to "
-            f"{LARGEST}; {least:g} is the least"
+            f"{LARGEST}; {least:g} to {most:g} would do"
         )
     return round(pixels)
 
