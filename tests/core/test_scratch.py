@@ -1,6 +1,7 @@
 """Numbers out of memory, and files of arrays that are nowhere whole."""
 
 import io
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,23 @@ def test_rows_come_back_in_any_order(tmp_path: Path) -> None:
     for wanted in ([], [3], [0, 1, 2, 48, 49, 7, 6], range(50)):
         np.testing.assert_array_equal(scratch[np.array(wanted, int)], rows[list(wanted)])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_threads_read_and_add_at_once(tmp_path: Path) -> None:
+    """As where a painting's state is kept beside the painting of the next frame."""
+    rows = np.arange(4000, dtype=np.float32).reshape(2000, 2)
+    scratch = Scratch(tmp_path, (2,))
+    scratch.append(rows)
+
+    def work(seed: int) -> None:
+        wanted = np.random.default_rng(seed).permutation(len(rows))
+        np.testing.assert_array_equal(scratch[wanted], rows[wanted])
+        first = scratch.append(rows[wanted])
+        np.testing.assert_array_equal(scratch[first + np.arange(len(rows))], rows[wanted])
+
+    with ThreadPoolExecutor(4) as threads:
+        list(threads.map(work, range(4)))
+    assert len(scratch) == 5 * len(rows)
 
 
 def test_a_folder_that_cannot_be_is_told(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import math
 import tempfile
 import weakref
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from vnca.core.errors import OutputError
 
 
 class Scratch:
-    """Rows that are added to the end of a file and read by their numbers; one thread at a time.
+    """Rows that are added to the end of a file and read by their numbers, by any thread.
 
     Nothing is left behind, however the program ends.
 
@@ -33,6 +34,9 @@ class Scratch:
         self.shape: tuple[int, ...] = (0, *row)
         self._folder = folder
         self._stride = math.prod(row) * self.dtype.itemsize
+        # The file has one place where it is read and written. A painting's state is kept beside
+        # the painting of the next frame, which reads it too.
+        self._placed = Lock()
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115
@@ -50,17 +54,18 @@ class Scratch:
         Raises:
             OutputError: If the disk is full.
         """
-        first = len(self)
         data: Any = np.ascontiguousarray(rows, self.dtype)
         assert data.shape[1:] == self.shape[1:], f"rows of {data.shape[1:]}, not {self.shape[1:]}"
         left = memoryview(data.reshape(-1)).cast("B")
-        try:
-            self._file.seek(first * self._stride)
-            while left:
-                left = left[self._file.write(left) :]
-        except OSError as error:
-            raise self._failed(error) from error
-        self.shape = (first + len(data), *self.shape[1:])
+        with self._placed:
+            first = len(self)
+            try:
+                self._file.seek(first * self._stride)
+                while left:
+                    left = left[self._file.write(left) :]
+            except OSError as error:
+                raise self._failed(error) from error
+            self.shape = (first + len(data), *self.shape[1:])
         return first
 
     def __getitem__(self, numbers: AnyArray) -> AnyArray:
@@ -74,14 +79,15 @@ class Scratch:
 
     def _fill(self, rows: Any, first: int) -> None:
         left = memoryview(rows.reshape(-1)).cast("B")
-        try:
-            self._file.seek(first * self._stride)
-            while left:
-                count = self._file.readinto(left)
-                assert count, "rows that were never written"
-                left = left[count:]
-        except OSError as error:
-            raise self._failed(error) from error
+        with self._placed:
+            try:
+                self._file.seek(first * self._stride)
+                while left:
+                    count = self._file.readinto(left)
+                    assert count, "rows that were never written"
+                    left = left[count:]
+            except OSError as error:
+                raise self._failed(error) from error
 
     def _failed(self, error: OSError) -> OutputError:
         return OutputError(f"{self._folder}: no room for scratch files ({error.strerror or error})")
