@@ -71,6 +71,7 @@ def test_a_report_has_every_measure_and_needs_nothing_else(
             assert reasons[name] in measure["reason"]
     assert measures["time.warp_short"]["ratio"] > 0
     assert measures["style.by_edges"]["trained_with"] is None  # an old file does not tell
+    assert measures["structure.regions"]["trained_with"] is False
     assert set(measures["density.moved"]["frames"]) == {"1", "2", "3"}
     assert len(measures["views.spread"]["views"]) == 32
     assert {"network", "dis", "unit"} <= set(measures["motion.direction"])
@@ -103,6 +104,10 @@ def test_what_a_run_was_trained_on_is_what_it_is_measured_on(
     assert "trained with features 'efficientnet'" in outcome.err
     assert measures["style.by_efficientnet"]["trained_with"] is True
     assert measures["style.by_edges"]["trained_with"] is False
+    assert measures["structure.regions"]["trained_with"] is True
+    assert measures["structure.patches"]["trained_with"] is False
+    page = (run / "evaluation" / "report.html").read_text()
+    assert page.count("Training compared regions, too") == 1
     assert list(measures["style.by_edges"]["frames"]) == ["2"]
     assert measures["time.warp_short"]["reason"] == "it takes 2 frames in a row"
     assert "Not measured" in (run / "evaluation" / "report.html").read_text()

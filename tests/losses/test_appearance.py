@@ -115,16 +115,72 @@ def test_grey_painting_differs_in_colour_only(
 
 
 def test_terms_add_up_and_weights_apply(network: FeatureNetwork, painting: FloatArray) -> None:
-    ones = AppearanceConfig(**few(network), style=1.0, moments=1.0, pixels=1.0)
+    ones = AppearanceConfig(
+        **few(network), style=1.0, moments=1.0, distribution=1.0, pixels=1.0, regions=1.0
+    )
     plain = measured(AppearanceLoss(network, painting, ones, SIZE), noise())
     assert plain.total.item() == pytest.approx(sum(t.item() for t in plain.terms.values()))
-    config = AppearanceConfig(**few(network), style=2.0, moments=0.0, pixels=3.0)
-    weighted = measured(AppearanceLoss(network, painting, config, SIZE), noise())
-    assert weighted.terms["moments"] == 0
-    assert weighted.terms["pixels"].item() == pytest.approx(
-        3 * plain.terms["pixels"].item(), rel=0.1
+    config = AppearanceConfig(
+        **few(network), style=2.0, moments=0.0, distribution=4.0, pixels=3.0, regions=5.0
     )
-    assert weighted.terms["style"].item() == pytest.approx(2 * plain.terms["style"].item(), rel=0.1)
+    weighted = measured(AppearanceLoss(network, painting, config, SIZE), noise())
+    assert "moments" not in weighted.terms
+    for name, times in {"style": 2, "distribution": 4, "pixels": 3, "regions": 5}.items():
+        expected = times * plain.terms[name].item()
+        assert weighted.terms[name].item() == pytest.approx(expected, rel=0.1), name
+
+
+def shuffled(picture: Tensor) -> Tensor:
+    """The same pixels in other places."""
+    order = torch.randperm(picture[0, 0].numel(), generator=generator())
+    return picture.flatten(2)[..., order].view(picture.shape)
+
+
+def of_distributions(network: FeatureNetwork, painting: FloatArray) -> AppearanceLoss:
+    config = AppearanceConfig(
+        **few(network), style=0.0, moments=0.0, distribution=1.0, pixels=0.0, regions=1.0
+    )
+    return AppearanceLoss(network, painting, config, SIZE)
+
+
+def test_distributions_tell_the_painting_from_others(
+    network: FeatureNetwork, painting: FloatArray
+) -> None:
+    loss, itself = of_distributions(network, painting), reduced(painting)
+    near = measured(loss, itself).terms
+    assert set(near) == {"distribution", "regions"}
+    for name, picture in {"inverted": 1 - itself, "shuffled": shuffled(itself)}.items():
+        for term, far in measured(loss, picture).terms.items():
+            assert near[term] < 0.7 * far, (name, term)
+
+
+def test_regions_see_contrast_in_large_shapes(painting: FloatArray) -> None:
+    """The same pixels, evenly mixed, have the same palette, and not the same regions."""
+    network, itself = load_network("efficientnet"), reduced(painting)
+    config = AppearanceConfig(**few(network), style=0.0, moments=0.0, pixels=1.0, regions=1.0)
+    loss = AppearanceLoss(network, painting, config, SIZE)
+    assert [region.side for region in loss._regions] == [SIZE // 16, SIZE // 8, SIZE // 4]
+    near, far = (measured(loss, p).terms for p in (itself, shuffled(itself)))
+    assert far["pixels"].item() == pytest.approx(near["pixels"].item(), rel=0.2)
+    assert far["regions"] > 1.5 * near["regions"]
+    # A picture that has too few squares of a size is not compared by them.
+    small = AppearanceConfig(style_scale=0.25, regions=1.0)
+    loss = AppearanceLoss(network, painting, small, 512)
+    assert [region.side for region in loss._regions] == [512 // 16]
+
+
+def test_distributions_lead_back_to_the_painting(painting: FloatArray) -> None:
+    """Pixels that follow the gradient of regions get the painting's contrast."""
+    loss, itself = of_distributions(load_network("efficientnet"), painting), reduced(painting)
+    picture = (itself.mean((2, 3), keepdim=True) + 0.1 * (noise() - 0.5)).requires_grad_()
+    before = measured(loss, picture).terms["regions"].item()
+    adam = torch.optim.Adam([picture], lr=0.02)
+    for _ in range(60):
+        adam.zero_grad()
+        measured(loss, picture).terms["regions"].backward()
+        adam.step()
+    assert measured(loss, picture).terms["regions"].item() < 0.3 * before
+    assert picture.std().item() > 0.7 * itself.std().item()
 
 
 def test_same_generator_same_loss(loss: AppearanceLoss) -> None:
@@ -283,7 +339,9 @@ def test_black_style_image_gives_finite_gradients(network: FeatureNetwork) -> No
     [
         ("style", -1.0),
         ("moments", -1.0),
+        ("distribution", -1.0),
         ("pixels", -1.0),
+        ("regions", -1.0),
         ("samples", 0),
         ("opacity_threshold", 1.0),
         ("style_scale", 0.0),
@@ -298,6 +356,8 @@ def test_impossible_options_are_named(option: str, value: object) -> None:
 def test_nothing_to_compare_is_refused() -> None:
     with pytest.raises(OptionError, match="colour"):
         AppearanceConfig(colour=False, grey=False)
+    with pytest.raises(OptionError, match=r"`appearance\.style`.*nothing is compared"):
+        AppearanceConfig(style=0.0, moments=0.0, pixels=0.0)
 
 
 @pytest.mark.usefixtures("unchecked_shapes")

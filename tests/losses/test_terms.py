@@ -7,6 +7,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import wasserstein_distance
 from torch.nn import functional
 
 from vnca.losses import (
@@ -17,6 +18,7 @@ from vnca.losses import (
     overflow,
     palette_distance,
     sample_positions,
+    sliced_distance,
     style_distance,
     to_yuv,
 )
@@ -51,6 +53,43 @@ def test_style_agrees_with_the_definition(n: int, m: int, c: int, seed: int) -> 
 def test_identical_sets_are_at_distance_zero() -> None:
     x = features(50, 16, seed=0)
     assert style_distance(x, x).item() == pytest.approx(0, abs=1e-12)
+    assert sliced(x, x.flip(0)) == pytest.approx(0, abs=1e-12)
+
+
+def sliced(x: torch.Tensor, y: torch.Tensor, slices: int = 32) -> float:
+    return sliced_distance(x, y, torch.Generator().manual_seed(0), slices).item()
+
+
+@settings(deadline=None, max_examples=30)
+@given(n=st.integers(1, 40), times=st.integers(1, 4), seed=st.integers(0, 2**31 - 1))
+def test_sliced_distance_of_numbers_is_that_of_earth_movers(n: int, times: int, seed: int) -> None:
+    x, y = features(n, 1, seed), features(n, 1, seed + 1)
+    expected = wasserstein_distance(x[:, 0].numpy(), y[:, 0].numpy())
+    assert sliced(x, y) == pytest.approx(expected, abs=1e-9)
+    # Of unlike numbers of vectors, quantiles are compared.
+    assert sliced(x, x.repeat(times, 1)) <= 2 * float(x.max() - x.min()) / n + 1e-9
+
+
+def test_sliced_distance_of_a_shift() -> None:
+    x = features(200, 3, seed=0)
+    # The mean length of a unit vector of three dimensions along a random direction is a half.
+    assert sliced(x, x + torch.tensor([0.0, 4.0, 0.0]), 4000) == pytest.approx(2, rel=0.03)
+
+
+def test_shares_of_colours_count_in_slices_alone() -> None:
+    grey, white = torch.full((1, 3), 0.2), torch.ones(1, 3)
+    many, few = (torch.cat([grey.repeat(n, 1), white.repeat(20 - n, 1)]) for n in (18, 2))
+    assert palette_distance(many, few).item() < 0.02
+    assert sliced(to_yuv(many), to_yuv(few)) > 0.2
+
+
+def test_sliced_distance_has_the_right_gradients() -> None:
+    x, y = (features(n, 4, seed=n).requires_grad_() for n in (6, 9))
+
+    def distance(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+        return sliced_distance(x, y, torch.Generator().manual_seed(0), 5)
+
+    assert torch.autograd.gradcheck(distance, (x, y))
 
 
 def test_lengths_of_vectors_do_not_matter() -> None:

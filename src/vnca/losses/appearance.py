@@ -22,9 +22,16 @@ from vnca.losses import (
     moments,
     palette_distance,
     sample_positions,
+    sliced_distance,
     style_distance,
+    to_yuv,
 )
 from vnca.rendering.colour import linear_to_srgb
+
+TERMS = ("style", "moments", "distribution", "pixels", "regions")
+"""What an appearance is made of: each has a weight of its name."""
+REGIONS = (16, 8, 4)
+"""Squares along the side of a view, of each size at which colours of regions are compared."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +45,14 @@ class AppearanceConfig:
     """Weight of style matching; 0 leaves it out."""
     moments: float = 1.0
     """Weight of the features' means and covariances; 0 leaves them out."""
+    distribution: float = 0.0
+    """Weight of the distribution of the features, by the sliced Wasserstein distance, which sees
+    more of it than means and covariances do; 0 leaves it out."""
     pixels: float = 5.0
     """Weight of the palette, the picture itself as layer zero; 0 leaves it out."""
+    regions: float = 0.0
+    """Weight of the shares that colours have in regions of three sizes, by the sliced Wasserstein
+    distance: contrast in large shapes; 0 leaves it out."""
     colour: bool = True
     """Compare the pictures in colour."""
     grey: bool = True
@@ -57,13 +70,16 @@ class AppearanceConfig:
     """Compare only where the smoke is at least this opaque."""
 
     def __post_init__(self) -> None:
-        for name in ("style", "moments", "pixels"):
+        for name in TERMS:
             if getattr(self, name) < 0:
                 raise OptionError(
                     f"`appearance.{name}` {getattr(self, name)}: must not be negative"
                 )
         if not (self.colour or self.grey):
             raise OptionError("`appearance.colour`, `appearance.grey`: at least one is needed")
+        if not any(getattr(self, name) for name in TERMS):
+            names = ", ".join(f"`appearance.{name}`" for name in TERMS)
+            raise OptionError(f"{names}: all are 0, nothing is compared")
         if self.samples < 1:
             raise OptionError(f"`appearance.samples` {self.samples}: must be at least 1")
         if not 0 <= self.opacity_threshold < 1:
@@ -100,6 +116,13 @@ class _Layer(NamedTuple):
     scale: float
 
 
+class _Region(NamedTuple):
+    """Squares of some pixels along a side, and their mean colours in the style image."""
+
+    side: int
+    colours: Float[Tensor, "n 3"]
+
+
 class AppearanceLoss:
     """Distance between pictures and one style image, over several layers of a network.
 
@@ -122,6 +145,8 @@ class AppearanceLoss:
     least_opacity = 0.05
     # Positions of the style image kept in each layer
     most_style_positions = 16384
+    # Of either picture, where they are sorted: few quantiles of few are far off by chance.
+    most_sorted = 1024
     _seed = 0
 
     def __init__(
@@ -165,6 +190,9 @@ class AppearanceLoss:
             self._layers = [
                 [self._described(maps) for maps in layer] for layer in self._features(picture)
             ]
+            sides = [max(1, size // count) for count in REGIONS]
+            regions = [_Region(side, _positions(_squares(picture, side))[0]) for side in sides]
+            self._regions = [some for some in regions if len(some.colours) >= self.fewest_positions]
 
     def __call__(
         self,
@@ -200,26 +228,36 @@ class AppearanceLoss:
         config = self.config
         # Keeps a picture without smoke part of the graph, with a gradient of zero.
         nothing = (picture * 0).sum()
-        terms = {"style": nothing, "moments": nothing, "pixels": nothing}
+        terms = dict.fromkeys(TERMS, nothing)
+        if config.regions:
+            for region in self._regions:
+                squares = _squares(picture, region.side)
+                for ours in self._shown(squares, self._chosen(opacity, squares)):
+                    distance = self._sorted_apart(to_yuv(ours), to_yuv(region.colours), generator)
+                    terms["regions"] = terms["regions"] + distance / len(self._regions)
         if config.pixels:
             for ours in self._shown(picture, self._chosen(opacity, picture)):
                 palettes = palette_distance(
                     self._drawn(ours, generator), self._drawn(self._pixels, generator)
                 )
                 terms["pixels"] = terms["pixels"] + palettes
-        if config.style or config.moments:
+        if config.style or config.moments or config.distribution:
             for ours, style in self._compared(picture, grey, opacity):
                 if config.moments:
                     distance = moment_distance(moments(ours), style.moments)
                     terms["moments"] = terms["moments"] + distance
+                if config.distribution:
+                    distance = self._sorted_apart(ours, style.features, generator)
+                    terms["distribution"] = terms["distribution"] + distance
                 if config.style:
                     distance = style_distance(
                         self._drawn(ours, generator), self._drawn(style.features, generator)
                     )
                     terms["style"] = terms["style"] + distance
-        weights = {"style": config.style, "moments": config.moments, "pixels": config.pixels}
-        terms = {name: value * weights[name] / len(picture) for name, value in terms.items()}
-        return Appearance(torch.stack(list(terms.values())).sum(), terms)
+        weights = {name: getattr(config, name) / len(picture) for name in TERMS}
+        terms = {name: value * weights[name] for name, value in terms.items() if weights[name]}
+        total = torch.stack([nothing, *terms.values()]).sum()
+        return Appearance(total, terms)
 
     def _compared(
         self, picture: Tensor, grey: Tensor | None, opacity: Tensor
@@ -231,11 +269,16 @@ class AppearanceLoss:
                 for features in self._shown(kind, chosen):
                     yield features / style.scale, style
 
-    def _drawn(self, features: Tensor, generator: torch.Generator) -> Tensor:
-        count, device = len(features), features.device
-        return chosen_rows(
-            features, sample_positions(count, self.config.samples, generator, device)
-        )
+    def _drawn(
+        self, features: Tensor, generator: torch.Generator, samples: int | None = None
+    ) -> Tensor:
+        samples = samples or self.config.samples
+        where = sample_positions(len(features), samples, generator, features.device)
+        return chosen_rows(features, where)
+
+    def _sorted_apart(self, x: Tensor, y: Tensor, generator: torch.Generator) -> Tensor:
+        x, y = (self._drawn(some, generator, self.most_sorted) for some in (x, y))
+        return sliced_distance(x, y, generator)
 
     def _features(self, picture: Tensor, grey: Tensor | None = None) -> list[list[Tensor]]:
         """Per layer, the maps of the picture in colour, in grey, or both."""
@@ -294,6 +337,13 @@ def style_scale(
 
 def _positions(maps: Float[Tensor, "b c r k"]) -> Float[Tensor, "b n c"]:
     return maps.flatten(2).transpose(1, 2)
+
+
+def _squares(picture: Float[Tensor, "b c r k"], side: int) -> Float[Tensor, "b c _ _"]:
+    """Means over squares of some pixels along a side, each half over the next; none if too few."""
+    if side > min(picture.shape[2:]):
+        return picture[:, :, :0, :0]
+    return functional.avg_pool2d(picture, side, stride=max(1, side // 2))
 
 
 def _resized(image: Tensor, shorter: int) -> Tensor:

@@ -100,11 +100,16 @@ class Measure:
         return described | dict(self.more)
 
 
-def measures(survey: Survey) -> tuple[Measure, ...]:
-    """All measures of a survey."""
+def measures(survey: Survey, *, regions_compared: bool = False) -> tuple[Measure, ...]:
+    """All measures of a survey.
+
+    Args:
+        survey: What was found.
+        regions_compared: Whether the training compared colours of regions, too.
+    """
     return (
         *_style(survey),
-        *_structure(survey),
+        *_structure(survey, regions_compared),
         *_views(survey),
         *_time(survey),
         *_motion(survey.turn.texture),
@@ -145,9 +150,12 @@ def _style(survey: Survey) -> Iterable[Measure]:
         )
 
 
-def _structure(survey: Survey) -> Iterable[Measure]:
+def _structure(survey: Survey, regions_compared: bool) -> Iterable[Measure]:
     for name, title, meaning, unit, better in _STRUCTURE:
         of = name.partition(".")[2]
+        trained_with = regions_compared and of == "regions"
+        if trained_with:
+            meaning += " Training compared regions, too: it says less than the others."
         values = {frame: getattr(found, of) for frame, found in survey.structure.items() if found}
         known = [value for value in values.values() if value is not None]
         yield Measure(
@@ -157,7 +165,7 @@ def _structure(survey: Survey) -> Iterable[Measure]:
             float(np.mean(known)) if known else None,
             unit,
             better,
-            more={"trained_with": False, "frames": values},
+            more={"trained_with": trained_with, "frames": values},
             reason="in the frames that were looked at, too little that is opaque, or nothing in "
             "it, is large enough to tell",
         )

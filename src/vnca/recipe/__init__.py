@@ -92,6 +92,8 @@ IN_MEMORY = Path("in-memory")
 """In the place of the path of an input that came from no file."""
 PICTURE_CELLS = "picture_cells"
 """What says in a model how many cells wide the rule was shown its picture, the shorter side."""
+COMPARES_REGIONS = "compares_regions"
+"""What says whether the rule was taught the colours of regions, which measures compare, too."""
 
 
 PictureGiven: TypeAlias = str | Path | AnyArray

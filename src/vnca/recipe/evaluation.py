@@ -31,7 +31,7 @@ from vnca.metrics.style import SMALLEST, StyleMetric
 from vnca.metrics.style_score import Judge
 from vnca.painting import StylizeConfig, stylize
 from vnca.painting.frames import VelocityCheck, require_dense
-from vnca.recipe import PICTURE_CELLS, SILENT, Watch, applied, tracked
+from vnca.recipe import COMPARES_REGIONS, PICTURE_CELLS, SILENT, Watch, applied, tracked
 from vnca.recipe.sequence import open_sequence, placed, region_of, sequence_region, volumes
 from vnca.rule.model import Model
 from vnca.rule.paint import require_refinement
@@ -263,7 +263,7 @@ def run(
     paintings = tracked(paintings, watch, "painting and measuring", given.count, "frames")
     judges = _judges(model, metric, options.size)
     found = survey(paintings, given.count, rule.refined(cells), setup, metric, judges)
-    listed = measures(found)
+    listed = measures(found, regions_compared=model.training.get(COMPARES_REGIONS) is True)
     watch.note(f"trained with features '{model.training.get('features', 'unknown')}'")
     if out is None:
         return Evaluation(listed, found)

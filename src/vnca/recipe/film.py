@@ -64,7 +64,7 @@ class FilmConfig(Shot):
     step: float = 0.5
     """Distance between samples along a ray, in cells, across where these are thinnest; a surface
     shows terraces where it is long."""
-    light: float = 1.2
+    light: float = 1.5
     """Strength of a light that the smoke is seen by and throws shadows in. 0: none, the smoke glows
     in its own colours before an even background."""
     light_azimuth: float = -55.0
@@ -72,7 +72,7 @@ class FilmConfig(Shot):
     while the camera turns. Below 0 it comes from the left."""
     light_elevation: float = 40.0
     """How far above the horizon it stands, degrees."""
-    ambient: float = 0.15
+    ambient: float = 0.25
     """Part of the light that comes from everywhere, 0 to 1: how bright shadows are."""
     shutter: float = 0.0
     """Motion blur: the part of a frame for which the shutter is open, 0 to 1; film cameras have

@@ -20,7 +20,7 @@ from vnca.core.errors import (
 from vnca.core.memory import memory_budget
 from vnca.features import FeatureNetwork
 from vnca.io.picture import resize, to_srgb8
-from vnca.recipe import PICTURE_CELLS, Watch, recorded, restored
+from vnca.recipe import COMPARES_REGIONS, PICTURE_CELLS, Watch, recorded, restored
 from vnca.rule.mixing import ORIGINS
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.checkpoint import CHECKPOINT_NAME, Checkpoint
@@ -350,6 +350,7 @@ def shown_and_judged(trainer: Trainer, network: FeatureNetwork) -> dict[str, Any
     """What a model file tells of how large its picture was shown, and of what compared with it."""
     return {
         PICTURE_CELLS: round(trainer.picture_cells[0], 2),
+        COMPARES_REGIONS: trainer.config.appearance.regions > 0,
         "features": network.name,
         "features_origin": network.origin,
         "features_dtype": str(network.dtype).removeprefix("torch."),

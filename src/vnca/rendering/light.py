@@ -45,7 +45,7 @@ class Light:
     azimuth: float
     elevation: float
     strength: float = 1.0
-    ambient: float = 0.15
+    ambient: float = 0.25
 
     def __post_init__(self) -> None:
         if not (isfinite(self.azimuth) and isfinite(self.elevation)):

@@ -110,7 +110,7 @@ class AppearanceTerm(Term):
         self._losses, self._generator = losses, generator
 
     def __call__(self, seen: Iteration) -> dict[str, Tensor]:
-        """Style, moments and palette."""
+        """Those of the loss that have a weight."""
         style, where = seen.judged
         loss, opacity = self._losses[style], seen.opacity
         if where is not None:
