@@ -3,10 +3,12 @@
     python benchmarks/styles/beside.py SMOKE OUT.csv [OPTIONS] PICTURE=RUN[=RUN …] [PICTURE=RUN …]
 
 All runs of a picture are compared with it as large, in cells, as the last of them was shown it: a
-picture shown smaller is another picture, with other strokes. What is measured already in OUT.csv is
-not measured again. At the end the table is printed in Markdown.
+picture shown smaller is another picture, with other strokes. `--refine` is of rules with a decoder:
+others would draw smaller patterns on finer cells, not finer ones. What is measured already in
+OUT.csv is not measured again. At the end the table is printed in Markdown.
 """
 
+import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -32,7 +34,9 @@ def main() -> None:
                 continue
             model = Model.load(run / MODEL_NAME)
             shown = replace(model, training={**model.training, PICTURE_CELLS: cells})
-            known[name] = {"style": name, **measured(shown, style, asked)}
+            refine = asked.refine if model.rule.decoder is not None else 1
+            options = argparse.Namespace(**{**vars(asked), "refine": refine})
+            known[name] = {"style": name, **measured(shown, style, options)}
             write_rows(asked.out, known)
             print(name, known[name]["seconds"], "s of processor time", file=sys.stderr, flush=True)
     print(table(known))

@@ -233,6 +233,9 @@ class AppearanceLoss:
             for region in self._regions:
                 squares = _squares(picture, region.side)
                 for ours in self._shown(squares, self._chosen(opacity, squares)):
+                    # A few squares cannot have the colours of all of the picture.
+                    if len(ours) < self.fewest_positions:
+                        continue
                     distance = self._sorted_apart(to_yuv(ours), to_yuv(region.colours), generator)
                     terms["regions"] = terms["regions"] + distance / len(self._regions)
         if config.pixels:
@@ -340,10 +343,10 @@ def _positions(maps: Float[Tensor, "b c r k"]) -> Float[Tensor, "b n c"]:
 
 
 def _squares(picture: Float[Tensor, "b c r k"], side: int) -> Float[Tensor, "b c _ _"]:
-    """Means over squares of some pixels along a side, each half over the next; none if too few."""
+    """Means over squares of some pixels along a side, side by side; none if too few."""
     if side > min(picture.shape[2:]):
         return picture[:, :, :0, :0]
-    return functional.avg_pool2d(picture, side, stride=max(1, side // 2))
+    return functional.avg_pool2d(picture, side)
 
 
 def _resized(image: Tensor, shorter: int) -> Tensor:
