@@ -15,12 +15,14 @@ from vnca.losses import (
     luma,
     moment_distance,
     moments,
+    ordered,
     overflow,
     palette_distance,
     sample_positions,
     sliced_distance,
     style_distance,
     to_yuv,
+    unit_vectors,
 )
 
 
@@ -57,7 +59,8 @@ def test_identical_sets_are_at_distance_zero() -> None:
 
 
 def sliced(x: torch.Tensor, y: torch.Tensor, slices: int = 32) -> float:
-    return sliced_distance(x, y, torch.Generator().manual_seed(0), slices).item()
+    directions = unit_vectors(x.shape[1], slices, torch.Generator().manual_seed(0)).to(x)
+    return sliced_distance(x, directions, ordered(y, directions)).item()
 
 
 @settings(deadline=None, max_examples=30)
@@ -83,11 +86,24 @@ def test_shares_of_colours_count_in_slices_alone() -> None:
     assert sliced(to_yuv(many), to_yuv(few)) > 0.2
 
 
+def test_few_quantiles_of_a_set_tell_nearly_all_of_it() -> None:
+    x, y = features(70, 5, seed=0), features(400, 5, seed=1)
+    directions = unit_vectors(5, 20, torch.Generator().manual_seed(2))
+    torch.testing.assert_close(directions.norm(dim=0), torch.ones(20))
+    directions = directions.double()
+    known, few = ordered(y, directions), ordered(y, directions, 100)
+    assert (known.diff(dim=0) >= 0).all()
+    assert len(few) == 100
+    expected = sliced_distance(x, directions, known)
+    torch.testing.assert_close(sliced_distance(x, directions, few), expected, rtol=0.01, atol=0)
+
+
 def test_sliced_distance_has_the_right_gradients() -> None:
     x, y = (features(n, 4, seed=n).requires_grad_() for n in (6, 9))
 
     def distance(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
-        return sliced_distance(x, y, torch.Generator().manual_seed(0), 5)
+        directions = unit_vectors(4, 5, torch.Generator().manual_seed(0)).to(x)
+        return sliced_distance(x, directions, ordered(y, directions))
 
     assert torch.autograd.gradcheck(distance, (x, y))
 

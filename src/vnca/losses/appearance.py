@@ -20,11 +20,13 @@ from vnca.losses import (
     luma,
     moment_distance,
     moments,
+    ordered,
     palette_distance,
     sample_positions,
     sliced_distance,
     style_distance,
     to_yuv,
+    unit_vectors,
 )
 from vnca.rendering.colour import linear_to_srgb
 
@@ -32,6 +34,10 @@ TERMS = ("style", "moments", "distribution", "pixels", "regions")
 """What an appearance is made of: each has a weight of its name."""
 REGIONS = (16, 8, 4)
 """Squares along the side of a view, of each size at which colours of regions are compared."""
+DIRECTIONS, SLICES = 128, 32
+"""Along which distributions of the style image are known, and are compared at a time."""
+MOST_SORTED = 1024
+"""Vectors of a picture that are sorted: few quantiles of few are far off by chance."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +119,7 @@ class _Layer(NamedTuple):
 
     features: Float[Tensor, "n c"]
     moments: Moments
+    slices: "_Slices | None"
     scale: float
 
 
@@ -120,7 +127,24 @@ class _Region(NamedTuple):
     """Squares of some pixels along a side, and their mean colours in the style image."""
 
     side: int
-    colours: Float[Tensor, "n 3"]
+    colours: "_Slices"
+
+
+class _Slices(NamedTuple):
+    """What is seen of the style image along directions, of which each comparison takes some."""
+
+    directions: Float[Tensor, "c k"]
+    quantiles: Float[Tensor, "q k"]
+
+    @classmethod
+    def of(cls, vectors: Tensor) -> "_Slices":
+        generator = torch.Generator().manual_seed(0)
+        directions = unit_vectors(vectors.shape[1], DIRECTIONS, generator).to(vectors)
+        return cls(directions, ordered(vectors, directions, MOST_SORTED))
+
+    def distance(self, vectors: Tensor, generator: torch.Generator) -> Tensor:
+        some = torch.randperm(DIRECTIONS, generator=generator)[:SLICES].to(vectors.device)
+        return sliced_distance(vectors, self.directions[:, some], self.quantiles[:, some])
 
 
 class AppearanceLoss:
@@ -145,8 +169,6 @@ class AppearanceLoss:
     least_opacity = 0.05
     # Positions of the style image kept in each layer
     most_style_positions = 16384
-    # Of either picture, where they are sorted: few quantiles of few are far off by chance.
-    most_sorted = 1024
     _seed = 0
 
     def __init__(
@@ -191,8 +213,12 @@ class AppearanceLoss:
                 [self._described(maps) for maps in layer] for layer in self._features(picture)
             ]
             sides = [max(1, size // count) for count in REGIONS]
-            regions = [_Region(side, _positions(_squares(picture, side))[0]) for side in sides]
-            self._regions = [some for some in regions if len(some.colours) >= self.fewest_positions]
+            squares = {side: _positions(_squares(picture, side))[0] for side in sides}
+            self._regions = [
+                _Region(side, _Slices.of(to_yuv(colours)))
+                for side, colours in squares.items()
+                if len(colours) >= self.fewest_positions
+            ]
 
     def __call__(
         self,
@@ -236,7 +262,7 @@ class AppearanceLoss:
                     # A few squares cannot have the colours of all of the picture.
                     if len(ours) < self.fewest_positions:
                         continue
-                    distance = self._sorted_apart(to_yuv(ours), to_yuv(region.colours), generator)
+                    distance = self._apart(region.colours, to_yuv(ours), generator)
                     terms["regions"] = terms["regions"] + distance / len(self._regions)
         if config.pixels:
             for ours in self._shown(picture, self._chosen(opacity, picture)):
@@ -249,8 +275,8 @@ class AppearanceLoss:
                 if config.moments:
                     distance = moment_distance(moments(ours), style.moments)
                     terms["moments"] = terms["moments"] + distance
-                if config.distribution:
-                    distance = self._sorted_apart(ours, style.features, generator)
+                if style.slices is not None:
+                    distance = self._apart(style.slices, ours, generator)
                     terms["distribution"] = terms["distribution"] + distance
                 if config.style:
                     distance = style_distance(
@@ -279,9 +305,8 @@ class AppearanceLoss:
         where = sample_positions(len(features), samples, generator, features.device)
         return chosen_rows(features, where)
 
-    def _sorted_apart(self, x: Tensor, y: Tensor, generator: torch.Generator) -> Tensor:
-        x, y = (self._drawn(some, generator, self.most_sorted) for some in (x, y))
-        return sliced_distance(x, y, generator)
+    def _apart(self, style: _Slices, ours: Tensor, generator: torch.Generator) -> Tensor:
+        return style.distance(self._drawn(ours, generator, MOST_SORTED), generator)
 
     def _features(self, picture: Tensor, grey: Tensor | None = None) -> list[list[Tensor]]:
         """Per layer, the maps of the picture in colour, in grey, or both."""
@@ -294,7 +319,9 @@ class AppearanceLoss:
         features = _positions(maps)[0]
         scale = features.square().mean().sqrt().item() or 1.0  # a silent layer stays as it is
         features = features / scale
-        return _Layer(self._kept(features), moments(features), scale)
+        kept = self._kept(features)
+        slices = _Slices.of(kept) if self.config.distribution else None
+        return _Layer(kept, moments(features), slices, scale)
 
     def _kept(self, features: Tensor) -> Tensor:
         count = self.most_style_positions
