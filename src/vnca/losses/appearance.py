@@ -160,7 +160,7 @@ class AppearanceLoss:
             composited over it, so that thin smoke does not read as black paint.
         style_scale: Shorter side of the style image relative to the views, given or chosen.
 
-    Reference: the VNCA paper's L_app; Kolkin, Salavon and Shakhnarovich 2019.
+    Reference: the VNCA paper's L_app; Kolkin, Salavon and Shakhnarovich 2019; Heitz et al. 2021.
     """
 
     # Below this many positions a layer says little about texture: the most opaque are added.
