@@ -8,7 +8,6 @@ others would draw smaller patterns on finer cells, not finer ones. What is measu
 OUT.csv is not measured again. At the end the table is printed in Markdown.
 """
 
-import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -35,8 +34,7 @@ def main() -> None:
             model = Model.load(run / MODEL_NAME)
             shown = replace(model, training={**model.training, PICTURE_CELLS: cells})
             refine = asked.refine if model.rule.decoder is not None else 1
-            options = argparse.Namespace(**{**vars(asked), "refine": refine})
-            known[name] = {"style": name, **measured(shown, style, options)}
+            known[name] = {"style": name, **measured(shown, style, asked, refine)}
             write_rows(asked.out, known)
             print(name, known[name]["seconds"], "s of processor time", file=sys.stderr, flush=True)
     print(table(known))

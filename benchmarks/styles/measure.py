@@ -66,28 +66,28 @@ def main() -> None:
                 else Model.load(asked.models / f"{name}.safetensors")
             )
             style = picture(str(model.training["style"]), asked.pictures)
-            known[name] = {"style": name, **measured(model, style, asked)}
+            known[name] = {"style": name, **measured(model, style, asked, asked.refine)}
             write_rows(asked.out, known)
             print(name, known[name]["seconds"], "s of processor time", file=sys.stderr, flush=True)
     print(table(known))
 
 
-def measured(model: Model, style: Path, asked: argparse.Namespace) -> dict[str, str]:
-    """A row: what is measured of one model, compared with its picture."""
+def measured(model: Model, style: Path, asked: argparse.Namespace, refine: int) -> dict[str, str]:
+    """A row: what is measured of one model, painted so finely, compared with its picture."""
     begun = time.process_time()
     found = vnca.evaluate(
         model,
         asked.smoke,
         style=style,
         frames=asked.frames,
-        refine=asked.refine,
+        refine=refine,
         size=asked.size,
         **read_as(asked),
     )
     by_name = {measure.name: measure for measure in found.measures}
     row = {
         "frames": asked.frames,
-        "refine": str(asked.refine),
+        "refine": str(refine),
         "seconds": f"{time.process_time() - begun:.0f}",
         "trained_with": str(model.training["features"]),
     }

@@ -212,7 +212,7 @@ class AppearanceLoss:
             self._layers = [
                 [self._described(maps) for maps in layer] for layer in self._features(picture)
             ]
-            sides = [max(1, size // count) for count in REGIONS]
+            sides = [max(1, size // count) for count in REGIONS] if config.regions else []
             squares = {side: _positions(_squares(picture, side))[0] for side in sides}
             self._regions = [
                 _Region(side, _Slices.of(to_yuv(colours)))
@@ -255,13 +255,11 @@ class AppearanceLoss:
         # Keeps a picture without smoke part of the graph, with a gradient of zero.
         nothing = (picture * 0).sum()
         terms = dict.fromkeys(TERMS, nothing)
-        if config.regions:
-            for region in self._regions:
-                squares = _squares(picture, region.side)
-                for ours in self._shown(squares, self._chosen(opacity, squares)):
-                    # A few squares cannot have the colours of all of the picture.
-                    if len(ours) < self.fewest_positions:
-                        continue
+        for region in self._regions:
+            squares = _squares(picture, region.side)
+            for ours in self._shown(squares, self._chosen(opacity, squares)):
+                # A few squares cannot have the colours of all of the picture.
+                if len(ours) >= self.fewest_positions:
                     distance = self._apart(region.colours, to_yuv(ours), generator)
                     terms["regions"] = terms["regions"] + distance / len(self._regions)
         if config.pixels:

@@ -72,7 +72,7 @@ class FilmConfig(Shot):
     while the camera turns. Below 0 it comes from the left."""
     light_elevation: float = 40.0
     """How far above the horizon it stands, degrees."""
-    ambient: float = 0.25
+    ambient: float = Light.ambient
     """Part of the light that comes from everywhere, 0 to 1: how bright shadows are."""
     shutter: float = 0.0
     """Motion blur: the part of a frame for which the shutter is open, 0 to 1; film cameras have
