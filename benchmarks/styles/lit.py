@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from measure import add_smoke, picture, read_as
+from measure import add_models, add_smoke, picture, read_as, trained
 
 import vnca
 from vnca.core import AnyArray, BoolArray
@@ -34,7 +34,6 @@ from vnca.io.smoke_format import NO_VELOCITY
 from vnca.metrics.setup import OPAQUE, Coloured, Pair, Seen, Setup, Viewpoint
 from vnca.metrics.style import StyleMetric
 from vnca.metrics.style_score import score_style
-from vnca.rule.library import load_style
 from vnca.rule.model import Model
 from vnca.training.scenes.smoke import smoke_bounds
 
@@ -136,7 +135,7 @@ def main() -> None:
 
 def judged(name: str, asked: argparse.Namespace) -> tuple[list[str], AnyArray]:
     """Cells of a row, and a row of pictures."""
-    model = load_style(name)
+    model = trained(name, asked.models)
     *_, last = vnca.stylize(
         model,
         asked.smoke,
@@ -220,6 +219,7 @@ def _asked() -> argparse.Namespace:
     add_smoke(parser, frames="40-45", refine=2)
     parser.add_argument("out", type=Path)
     parser.add_argument("styles", nargs="+")
+    add_models(parser)
     parser.add_argument("--sides", type=int, default=4)
     parser.add_argument("--samples", type=int, default=64)
     return parser.parse_args()

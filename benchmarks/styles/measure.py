@@ -17,7 +17,7 @@ from pathlib import Path
 
 import vnca
 from vnca.metrics.measures import Measure
-from vnca.rule.library import load_style, style_names
+from vnca.rule.library import SUFFIX, load_style, style_names
 from vnca.rule.model import Model
 
 HERE = Path(__file__).parent
@@ -60,16 +60,17 @@ def main() -> None:
     known = rows_of(asked.out)
     for name in asked.styles or style_names():
         if name not in known:
-            model = (
-                load_style(name)
-                if asked.models is None
-                else Model.load(asked.models / f"{name}.safetensors")
-            )
+            model = trained(name, asked.models)
             style = picture(str(model.training["style"]), asked.pictures)
             known[name] = {"style": name, **measured(model, style, asked, asked.refine)}
             write_rows(asked.out, known)
             print(name, known[name]["seconds"], "s of processor time", file=sys.stderr, flush=True)
     print(table(known))
+
+
+def trained(name: str, models: Path | None) -> Model:
+    """A style of the library, or of a folder in its place."""
+    return load_style(name) if models is None else Model.load(models / (name + SUFFIX))
 
 
 def measured(model: Model, style: Path, asked: argparse.Namespace, refine: int) -> dict[str, str]:
@@ -170,6 +171,11 @@ def add_smoke(parser: argparse.ArgumentParser, *, frames: str, refine: int) -> N
     add_reading(parser, frames=frames, refine=refine)
 
 
+def add_models(parser: argparse.ArgumentParser) -> None:
+    """The option of `trained`."""
+    parser.add_argument("--models", type=Path, help="a folder of others in the library's place")
+
+
 def runs_parser(about: str | None, *, frames: str, refine: int) -> argparse.ArgumentParser:
     """Of a script about several runs of each picture; options as `add_reading` has them."""
     assert about is not None
@@ -212,7 +218,7 @@ def _asked() -> argparse.Namespace:
     add_smoke(parser, frames="30-49", refine=1)
     parser.add_argument("out", type=Path)
     parser.add_argument("styles", nargs="*", help="all unless given")
-    parser.add_argument("--models", type=Path, help="a folder of others in the library's place")
+    add_models(parser)
     add_size(parser)
     return parser.parse_args()
 

@@ -5,6 +5,7 @@ from functools import reduce
 
 import numpy as np
 import pytest
+from torch import Tensor
 
 from vnca import painting
 from vnca.core import Box, FloatArray
@@ -16,6 +17,7 @@ from vnca.painting import StylizeConfig
 from vnca.rule import Rule
 from vnca.rule.conditioning import priors
 from vnca.training.config import SmokeConfig
+from vnca.training.terms import Iteration, Term
 from vnca.training.trainers import smoke_trainer
 
 
@@ -63,3 +65,35 @@ def test_a_frame_of_sheared_cells_is_not_trained_on(
     sheared = dataclasses.replace(tiny_smoke, index_to_world=matrix)
     with pytest.raises(GridError, match="frame 1: its voxels are sheared"):
         smoke_trainer(sheared, style, tiny_config, vgg)
+
+
+def test_frames_are_trained_on_by_turns_and_seen_as_large(
+    tiny_smoke: Volume, style: FloatArray, tiny_config: SmokeConfig, vgg: VGG16
+) -> None:
+    columns = len(tiny_smoke.density)
+    half = dataclasses.replace(
+        tiny_smoke,
+        density=tiny_smoke.density * (np.arange(columns) < columns // 2)[:, None, None],
+        frame=2,
+    )
+    config = dataclasses.replace(tiny_config, iterations=4)
+    trainer = smoke_trainer([tiny_smoke, half], style, config, vgg)
+    whole, part = trainer.scenes
+    assert len(part.domain) < len(whole.domain)
+    assert part.width == whole.width
+    assert part.viewpoint(np.random.default_rng(0)).camera.height == whole.width
+    seen = []
+
+    class Watching(Term):
+        name = "watching"
+
+        def __call__(self, asked: Iteration) -> dict[str, Tensor]:
+            seen.append(len(asked.scene.domain))
+            return {}
+
+    trainer.terms = (*trainer.terms, Watching())
+    for _ in trainer.run():
+        pass
+    assert seen == 2 * [len(whole.domain), len(part.domain)]
+    pools = [name for name in trainer.snapshot() if name.startswith("pool")]
+    assert pools == ["pool", "pool 2"]

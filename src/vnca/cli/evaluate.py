@@ -216,7 +216,7 @@ def _runs(options: Ablate, smoke: Volume) -> list[_Run]:
     runs = []
     for variant, config in _configurations(options):
         folder = options.out / f"{variant.replace(' ', '_')}-{config.seed}"
-        wanted = training_inputs(smoke, style, config, network)
+        wanted = training_inputs([smoke], style, config, network)
         runs.append(_Run(variant, config, folder, _is_trained(folder, wanted, config.iterations)))
     return runs
 

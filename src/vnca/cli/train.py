@@ -34,6 +34,9 @@ class Train(smoke.SmokeRun):
     """Folder of the run: model, configuration, previews and loss curves."""
     frame: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FRAME")]
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
+    more_frames: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="[FRAME …]")] = ()
+    """Further frames, of its sequence or of other smoke, that the rule is trained on by turns with
+    it: so it paints smoke that it never saw as it paints these."""
     style: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STYLE")]
     """The picture (docs/guide/formats.md lists the formats)."""
     more_styles: Annotated[

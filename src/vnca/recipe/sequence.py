@@ -1,6 +1,6 @@
 """A sequence of smoke in files: its frames, gaps, its box, volumes read ahead."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial, reduce
@@ -11,7 +11,7 @@ import numpy as np
 
 from vnca.core import AnyArray, Box, FloatArray
 from vnca.core.camera import world_box
-from vnca.core.errors import SequenceError
+from vnca.core.errors import GridError, SequenceError
 from vnca.core.files import existing_file
 from vnca.core.lattice import Lattice, Placement, Region
 from vnca.core.volume import Volume
@@ -25,6 +25,9 @@ from vnca.rule import SMOKE_THRESHOLD, Rule, density_scale
 
 LOOKED_AT = 12
 """Frames, at most, of which the one with the most smoke is chosen."""
+MOST_APART = 30.0
+"""Factor between the densities of frames trained on together, beyond which they are surely not in
+the same units."""
 
 
 def open_sequence(pattern: str | Path, frames: str | None, watch: Watch) -> FrameSequence:
@@ -59,6 +62,47 @@ def read_alone(path: Path, smoke: SmokeFormat, watch: Watch) -> Volume:
     if not place.is_whole:
         watch.note(_resampled(path, volume.index_to_world, lattice, others=0))
     return on_lattice(volume, lattice, what)
+
+
+def frames_alone(
+    paths: Sequence[Path],
+    formats: Sequence[SmokeFormat],
+    watch: Watch,
+    volumes: Sequence[Volume] | None = None,
+) -> list[Volume]:
+    """Frames that a rule is trained on together, each on a lattice of its own.
+
+    Args:
+        paths: Their files, or what stands in their place.
+        formats: How each is read.
+        watch: Is told of those whose voxels are not cells.
+        volumes: The frames, if they need not be read.
+
+    Raises:
+        VncaError: If one cannot be read, can have no place on a lattice, or holds no smoke; if just
+            some have a velocity; or if their densities are surely in different units.
+    """
+    if volumes is None:
+        frames = [read_alone(*read, watch) for read in zip(paths, formats, strict=True)]
+    else:
+        lattices = [Lattice.of(volume.index_to_world, "the frame") for volume in volumes]
+        given = zip(volumes, lattices, strict=True)
+        frames = [on_lattice(volume, lattice, "the frame") for volume, lattice in given]
+    for path, frame in zip(paths, frames, strict=True):
+        if not frame.density.any():
+            raise GridError(
+                f"{path}: there is no smoke in this frame to train on; choose a later one"
+            )
+        if (frame.velocity is None) != (frames[0].velocity is None):
+            without = path if frame.velocity is None else paths[0]
+            raise GridError(f"{without}: has no velocity, as another of the frames has")
+        times = density_scale(frame.density) / density_scale(frames[0].density)
+        if not 1 / MOST_APART <= times <= MOST_APART:
+            raise GridError(
+                f"{path}: has {times:g} times the density of {paths[0]}; both have to be in the "
+                "same units"
+            )
+    return frames
 
 
 def beside(path: Path, smoke: SmokeFormat) -> SmokeFormat:

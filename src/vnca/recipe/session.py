@@ -157,12 +157,13 @@ class Session:
         with self.folder:
             if checkpoint is None:
                 self._keep()
-            known = ("frame", "style", "more_styles")
+            known = ("frame", "more_frames", "style", "more_styles")
             inputs = {name: self.asked[name] for name in known if self.asked.get(name)}
             facts = {**self.training, "inputs": inputs, FINGERPRINTS: self.inputs}
             self.folder.start(trainer.config, facts)
+            smoke = " + ".join(str(len(scene.domain)) for scene in trainer.scenes)
             self.watch.note(
-                f"{len(trainer.scene.domain)} cells, {trainer.rule().weight_count} weights, "
+                f"{smoke} cells, {trainer.rule().weight_count} weights, "
                 f"features '{self.training['features']}', {self.training['device']}"
             )
             chosen = "" if trainer.config.appearance.style_scale else ", chosen by its strokes"
@@ -212,7 +213,7 @@ class Session:
             trainer.undo()
             self._keep()
             self._save()
-            advice = memory_advice(trainer.scene, trainer.config, trainer.kept_states)
+            advice = memory_advice(trainer.scenes, trainer.config, trainer.kept_states)
             going_on = (
                 f"to go on from here when more is free, or with a `memory_budget`: {self._call}"
                 if folder.path is not None
@@ -342,7 +343,9 @@ def asked(kind: type[TrainingOptions], options: Any) -> dict[str, Any]:
         config = dataclasses.replace(config, features=str(Path(config.features).absolute()))
     given = {field.name: getattr(options, field.name) for field in dataclasses.fields(kind)}
     paths: dict[str, Any] = {n: v.absolute() for n, v in given.items() if isinstance(v, Path)}
-    paths["more_styles"] = tuple(path.absolute() for path in given["more_styles"])
+    for name in ("more_styles", "more_frames"):
+        if name in given:
+            paths[name] = tuple(path.absolute() for path in given[name])
     return recorded(kind(**{**given, **paths, "config": config}))
 
 

@@ -1,15 +1,14 @@
-"""Training on smoke as it gives good pictures: first a solid texture, then one frame of smoke."""
+"""Training on smoke as it gives good pictures: first a solid texture, then a frame of smoke."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from vnca.core import FloatArray
-from vnca.core.errors import GridError, OptionError
+from vnca.core import AnyArray, FloatArray
+from vnca.core.errors import OptionError
 from vnca.core.files import remove_file
-from vnca.core.lattice import Lattice
 from vnca.core.memory import memory_budget
 from vnca.core.records import distributed
 from vnca.core.volume import Volume
@@ -17,7 +16,7 @@ from vnca.engine.tensors import choose_device, require_equal_runs
 from vnca.features import FeatureNetwork, load_network
 from vnca.io import SmokeFormat, missing_velocity
 from vnca.io.picture import read_style
-from vnca.io.smoke_format import NO_VELOCITY, on_lattice
+from vnca.io.smoke_format import NO_VELOCITY
 from vnca.recipe import (
     IN_MEMORY,
     SILENT,
@@ -28,7 +27,7 @@ from vnca.recipe import (
     texture,
     told_of_styles,
 )
-from vnca.recipe.sequence import beside, read_alone
+from vnca.recipe.sequence import beside, frames_alone
 from vnca.recipe.session import (
     ResumeOptions,
     Session,
@@ -67,6 +66,9 @@ class SmokeRun(TrainingOptions):
 
     frame: Path
     """A frame of smoke: OpenVDB, or npz as Mantaflow writes it."""
+    more_frames: tuple[Path, ...] = ()
+    """Further frames, of its sequence or of other smoke, that the rule is trained on by turns with
+    it: so it paints smoke that it never saw as it paints these."""
     style: Path
     """The picture: PNG, JPEG, WebP, OpenEXR, … (docs/guide/formats.md lists them)."""
     more_styles: tuple[Path, ...] = ()
@@ -90,6 +92,8 @@ class ResumeSmokeRun(ResumeOptions):
 
     frame: Path | None = None
     """The frame, if it is no longer where it was."""
+    more_frames: tuple[Path, ...] | None = None
+    """The further frames, if they are no longer where they were."""
     style: Path | None = None
     """The picture, if it is no longer where it was."""
     more_styles: tuple[Path, ...] | None = None
@@ -97,7 +101,7 @@ class ResumeSmokeRun(ResumeOptions):
 
 
 def train(
-    frame: str | Path | Volume,
+    frame: str | Path | Volume | Sequence[str | Path] | Sequence[Volume],
     style: PictureGiven | Sequence[PictureGiven],
     *,
     out: str | Path | None = None,
@@ -115,7 +119,8 @@ def train(
     """Learn from one frame of smoke and one picture how to paint, as `vnca train` does.
 
     Args:
-        frame: A file of smoke, or a volume with velocity in cells a frame.
+        frame: A file of smoke, or a volume with velocity in cells a frame; or a list of either, of
+            one sequence or of several, which the rule is trained on by turns.
         style: A picture file, or an array `[r, c, 3]` of linear RGB from 0 to 1; or a list of up to
             eight, which the rule learns all.
         out: Folder for the model, checkpoints, previews and loss curves. Unless given, nothing is
@@ -144,10 +149,11 @@ def train(
     if "texture" in options and init is not None:
         raise OptionError(TEXTURE_OR_INIT)
     smoke, config = distributed(options, SmokeFormat(), preset_of(SmokeConfig, preset))
-    volume = frame if isinstance(frame, Volume) else None
+    (at, *more), volumes = _given_frames(frame)
     (first, *others), pictures = given_pictures(style)
     asked = SmokeRun(
-        frame=IN_MEMORY if isinstance(frame, Volume) else Path(frame),
+        frame=at,
+        more_frames=tuple(more),
         style=first,
         more_styles=tuple(others),
         out=None if out is None else Path(out),
@@ -167,12 +173,13 @@ def train(
             again = ResumeSmokeRun(
                 resume=asked.out,
                 frame=asked.frame,
+                more_frames=asked.more_frames,
                 style=asked.style,
                 more_styles=asked.more_styles,
                 memory_budget=memory_budget,
             )
-            return resume_run(again, watch, volume=volume, pictures=pictures, terms=terms)
-    return run(asked, watch, volume=volume, pictures=pictures, terms=terms)
+            return resume_run(again, watch, volumes=volumes, pictures=pictures, terms=terms)
+    return run(asked, watch, volumes=volumes, pictures=pictures, terms=terms)
 
 
 def run(
@@ -180,7 +187,7 @@ def run(
     watch: Watch,
     *,
     checkpoint: Checkpoint | None = None,
-    volume: Volume | None = None,
+    volumes: Sequence[Volume] | None = None,
     pictures: Sequence[FloatArray] | None = None,
     terms: Sequence[Term] = (),
 ) -> Model:
@@ -190,7 +197,7 @@ def run(
         options: What is asked.
         watch: Is told how far it has come.
         checkpoint: Where the training was left.
-        volume: The frame, if it need not be read.
+        volumes: The frames, if they need not be read.
         pictures: The style pictures, linear RGB `[r, c, 3]`, if they need not be read.
         terms: Further terms of the loss on smoke.
 
@@ -201,20 +208,14 @@ def run(
     folder = run_folder(options.out, overwrite=options.overwrite, checkpoint=checkpoint)
     styles = pictures or [read_style(path) for path in (options.style, *options.more_styles)]
     device = choose_device(options.device)
-    if volume is None:
-        smoke_format = beside(options.frame, options.smoke)
-        smoke = read_alone(options.frame, smoke_format, watch)
-    else:
-        smoke_format = options.smoke
-        smoke = on_lattice(volume, Lattice.of(volume.index_to_world, "the frame"), "the frame")
-    if not smoke.density.any():
-        raise GridError(
-            f"{options.frame}: there is no smoke in this frame to train on; choose a later one"
-        )
+    paths = (options.frame, *options.more_frames)
+    formats = [beside(path, options.smoke) if volumes is None else options.smoke for path in paths]
+    smoke, smoke_format = frames_alone(paths, formats, watch, volumes), formats[0]
     config = shared_out(told_styles(options.config, styles), len(styles))
     if len(styles) > 1:
         watch.note(f"{len(styles)} styles: {config.iterations} iterations")
-    if smoke.velocity is None:
+    has_velocity = smoke[0].velocity is not None
+    if not has_velocity:
         if smoke_format.velocity_grid != NO_VELOCITY:
             watch.note(f"{missing_velocity(options.frame)}; the rule learns nothing of motion")
         # Or painting would condition it on what training gave no meaning to.
@@ -229,7 +230,7 @@ def run(
             smoke, styles, config, network, device=device, memory_budget=budget, terms=terms
         )
     training = {
-        "frame": options.frame.name,
+        "frame": ", ".join(path.name for path in paths),
         **told_of_styles((options.style, *options.more_styles), trainer.picture_cells),
         "preset": Path(options.preset).name,
         "seed": config.seed,
@@ -265,11 +266,11 @@ def run(
             trainer.begin_with(without_prior_weights(model.rule), origins(model))
         checkpoint = None
     notes = []
-    if config.motion.weight and smoke.velocity is not None and not trainer.teaches_motion:
+    if config.motion.weight and has_velocity and not trainer.teaches_motion:
         notes.append(f"{options.frame}: nothing moves in it; its texture is not taught to move")
     model = session.run(checkpoint, *notes)
     inputs = {
-        "frame": options.frame if volume is None else volume,
+        "frame": options.frame if volumes is None else volumes[0],
         "style": options.style if pictures is None else pictures[0],
     }
     if options.more_styles:
@@ -277,19 +278,42 @@ def run(
     return dataclasses.replace(model, inputs=inputs)
 
 
+def _given_frames(
+    frame: str | Path | Volume | Sequence[str | Path] | Sequence[Volume],
+) -> tuple[list[Path], list[Volume] | None]:
+    """The paths of frames, and the frames themselves if they come from no files.
+
+    Raises:
+        OptionError: If there is none, or if just some come from files.
+    """
+    several = [frame] if isinstance(frame, (str, Path, Volume)) else [*frame]
+    volumes = [each for each in several if isinstance(each, Volume)]
+    if not several or len(volumes) not in (0, len(several)):
+        raise OptionError("`frame`: expected files or volumes, not both")
+    if volumes:
+        return [IN_MEMORY] * len(volumes), volumes
+    return [Path(each) for each in several if not isinstance(each, Volume)], None
+
+
 def training_inputs(
-    smoke: Volume,
+    smoke: Sequence[Volume],
     style: FloatArray | Sequence[FloatArray],
     config: SmokeConfig,
     network: FeatureNetwork,
     terms: Sequence[Term] = (),
 ) -> dict[str, str]:
     """What tells a training on smoke from others: the `fingerprints` of what goes into it."""
-    frame = [smoke.density, smoke.origin]
-    if smoke.velocity is not None:
-        frame.append(smoke.velocity)
-    inputs = fingerprints(style, config, network, frame=frame)
+    first, *others = ([*_told(frame)] for frame in smoke)
+    further = {"further frames": [array for told in others for array in told]} if others else {}
+    inputs = fingerprints(style, config, network, frame=first, **further)
     return inputs | ({TERMS: ", ".join(term.name for term in terms)} if terms else {})
+
+
+def _told(frame: Volume) -> Iterator[AnyArray | tuple[int, ...]]:
+    """What a rule may be told of a frame."""
+    yield from (frame.density, frame.origin)
+    if frame.velocity is not None:
+        yield frame.velocity
 
 
 def _texture(
@@ -338,7 +362,7 @@ def resume_run(
     options: ResumeSmokeRun,
     watch: Watch,
     *,
-    volume: Volume | None = None,
+    volumes: Sequence[Volume] | None = None,
     pictures: Sequence[FloatArray] | None = None,
     terms: Sequence[Term] = (),
 ) -> Model:
@@ -351,4 +375,4 @@ def resume_run(
     if left is None:
         return load(options.resume)
     begun, checkpoint = left
-    return run(begun, watch, checkpoint=checkpoint, volume=volume, pictures=pictures, terms=terms)
+    return run(begun, watch, checkpoint=checkpoint, volumes=volumes, pictures=pictures, terms=terms)

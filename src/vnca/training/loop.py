@@ -14,7 +14,7 @@ from torch import Tensor
 
 from vnca.core import FloatArray
 from vnca.core.errors import DivergenceError
-from vnca.engine import Compute, open_session
+from vnca.engine import Compute, Session, open_session
 from vnca.engine.automaton import DecoderWeights as Decoded
 from vnca.engine.automaton import Weights
 from vnca.features import FeatureNetwork
@@ -24,9 +24,10 @@ from vnca.rule import DENSITY_CHANGE, Decoder, Rule
 from vnca.training import Snapshot, count
 from vnca.training.config import TrainingConfig
 from vnca.training.descent import MOST_ROLLBACKS, Descent
+from vnca.training.ground import Ground
 from vnca.training.rollout import Pool, roll_out, states_to_keep
 from vnca.training.scenes import Scene
-from vnca.training.styles import WHOLE, Lessons, Mix
+from vnca.training.styles import WHOLE, Mix
 from vnca.training.terms import AppearanceTerm, Iteration, OverflowTerm, SteadinessTerm, Term
 
 
@@ -50,14 +51,13 @@ class Progress:
 
 
 class Trainer:
-    """A rule in training on one scene and one style picture, or several.
+    """A rule in training on a scene and a style picture, or several of either.
 
     Every random choice comes from `config.seed`: same seed, same machine, same rule.
 
     Attributes:
         config: The hyperparameters.
-        scene: What is trained on.
-        session: What computes the automaton; another that does the same may take its place.
+        scenes: What is trained on, by turns.
         iteration: Iterations done.
         origins: What tells the weights that it began with, and theirs, from others.
         appearances: How far pictures are from each style picture.
@@ -73,6 +73,7 @@ class Trainer:
         config: TrainingConfig,
         network: FeatureNetwork,
         *,
+        more_scenes: Sequence[Scene[Any]] = (),
         terms: Sequence[Term] = (),
         memory_budget: int | None = None,
     ) -> None:
@@ -84,6 +85,7 @@ class Trainer:
             style: Linear RGB `[r, c, 3]`; one for each style of a rule that mixes several.
             config: The hyperparameters.
             network: The frozen network that judges pictures.
+            more_scenes: Others that are trained on by turns with it, of the same width.
             terms: Further terms of the loss, beside appearance and overflow.
             memory_budget: Bytes that the program may take: rollouts keep as few states as that
                 asks for, and compute the others again. The result is the same to the bit.
@@ -91,7 +93,7 @@ class Trainer:
         Raises:
             OptionError: If the budget is not enough.
         """
-        self.config, self.scene = config, scene
+        self.config, self.scenes = config, (scene, *more_scenes)
         self.iteration = 0
         self.origins: tuple[str, ...] = ()
         device = scene.priors.device
@@ -105,6 +107,8 @@ class Trainer:
         self._decoder = scene.decoder
         for tensor in self._decoder or ():
             tensor.requires_grad_()
+        for other in more_scenes:
+            other.decoder = self._decoder
         if scene.dimensions == 2:
             self._weights.hidden.register_hook(
                 partial(_without_columns, columns=depth_columns(config.rule.channels))
@@ -114,13 +118,6 @@ class Trainer:
             if self._decoder is not None:
                 self._decoder.output.register_hook(_without_density)
                 self._decoder.output_bias.register_hook(_without_density)
-        self.session = open_session(
-            replace(rule.automaton(config.seed), weights=self._weights),
-            scene.domain,
-            scene.priors,
-            Compute(config.backend, str(device)),
-            differentiable=True,
-        )
         self.appearances = tuple(
             AppearanceLoss(
                 network,
@@ -132,9 +129,7 @@ class Trainer:
             )
             for picture in ([style] if isinstance(style, np.ndarray) else style)
         )
-        self._columns, self._lessons = rule.config.style_columns, None
-        if self._columns is not None:
-            self._lessons = Lessons(len(self.appearances), scene.domain, config.seed)
+        self._columns = rule.config.style_columns
         self._random = np.random.default_rng(config.seed)
         self._generator = torch.Generator().manual_seed(config.seed)
         own: list[Term] = [
@@ -144,11 +139,39 @@ class Trainer:
         if config.steadiness:
             own.append(SteadinessTerm(config.steadiness))
         self.terms = (*own, *terms)
-        self._pool = Pool(scene.seed(config.rule.channels), config.pool, self._random)
+        styles = len(self.appearances)
+        self._grounds = [
+            Ground.of(each, self._session, config, styles=styles, random=self._random)
+            for each in self.scenes
+        ]
         self._descent = self._fresh_descent()
         self._steps = 0  # of all rollouts: no two share a mask
         self._before: dict[str, Snapshot] | None = None  # the iteration that is under way
-        self.kept_states = states_to_keep(scene, config, memory_budget)
+        self.kept_states = states_to_keep(self.scenes, config, memory_budget)
+
+    @property
+    def scene(self) -> Scene[Any]:
+        """The first of those trained on, by which a rule is judged."""
+        return self.scenes[0]
+
+    @property
+    def session(self) -> Session:
+        """What computes the automaton on it; another that does the same may take its place."""
+        return self._grounds[0].session
+
+    @session.setter
+    def session(self, session: Session) -> None:
+        self._grounds[0].session = session
+
+    def _session(self, scene: Scene[Any]) -> Session:
+        """What computes the automaton on a scene, by the weights that are trained."""
+        return open_session(
+            replace(self._rule.automaton(self.config.seed), weights=self._weights),
+            scene.domain,
+            scene.priors,
+            Compute(self.config.backend, str(scene.priors.device)),
+            differentiable=True,
+        )
 
     def begin_with(self, rule: Rule, origins: Sequence[str] = ()) -> None:
         """Take over the weights of a rule of the same shape, before the first iteration.
@@ -267,21 +290,24 @@ class Trainer:
     def _parts(self) -> dict[str, Pool | Descent | Term]:
         """What may remember something from one iteration to the next."""
         terms = {term.name: term for term in self.terms}
-        return {"pool": self._pool, "descent": self._descent, **terms}
+        first, *others = (ground.pool for ground in self._grounds)
+        pools = {f"pool {number}": pool for number, pool in enumerate(others, 2)}
+        return {"pool": first, **pools, "descent": self._descent, **terms}
 
     def _improve(self) -> Progress:
         config = self.config
-        slot, life, age, before = self._pool.draw(self.iteration)
+        ground = self._grounds[self.iteration % len(self._grounds)]
+        slot, life, age, before = ground.pool.draw(self.iteration // len(self._grounds))
         kept = before
         steps = int(self._random.integers(config.shortest_rollout, config.longest_rollout + 1))
-        scene = self.scene.augmented(life)
+        scene = ground.scene.augmented(life)
         if config.rule.transport and age:
             kept, before = scene.transported(before, self._random)
         judged = WHOLE
-        mix = self._lessons and self._lessons.of(life, age)
+        mix = ground.lessons and ground.lessons.of(life, age)
         if mix is not None and self._columns is not None:
             scene, age = mix.asked(scene, self._columns), mix.age
-        state = self._roll(before, range(self._steps, self._steps + steps), scene)
+        state = self._roll(ground, before, range(self._steps, self._steps + steps), scene)
         self._steps += steps
         viewpoint = scene.viewpoint(self._random)
         if mix is not None:
@@ -310,7 +336,7 @@ class Trainer:
                 sums[term.name] = torch.stack([*found.values()]).sum()
         first, *others = sums.values()
         loss = first + torch.stack(others).sum()
-        is_sound = self._pool.put(slot, state)
+        is_sound = ground.pool.put(slot, state)
         rate = config.rate(self.iteration)
         self.iteration += 1
         went_on = self._descent.step(loss, rate, self.iteration, exploded=not is_sound)
@@ -324,15 +350,15 @@ class Trainer:
 
     def grow(self, steps: int, style: int = 0) -> Tensor:
         """A state grown from the seed, as painting does; no random stream moves."""
-        scene = self.scene
+        ground, scene = self._grounds[0], self.scene
         if self._columns is not None:
             scene = Mix(style, style, 0.0, 0).asked(scene, self._columns)
         with torch.no_grad():
-            return self._roll(scene.seed(self.config.rule.channels), range(steps), scene)
+            return self._roll(ground, scene.seed(self.config.rule.channels), range(steps), scene)
 
-    def _roll(self, state: Tensor, steps: range, scene: Scene[Any]) -> Tensor:
+    def _roll(self, ground: Ground, state: Tensor, steps: range, scene: Scene[Any]) -> Tensor:
         """The state after the numbered steps of the rule; differentiable in the weights."""
-        session = self.session.conditioned(scene.priors)
+        session = ground.session.conditioned(scene.priors)
         return roll_out(session.step, state, steps, kept_states=self.kept_states)
 
     def rule(self) -> Rule:

@@ -213,8 +213,18 @@ class MemoryNeeds:
         return self.pool + self.pictures + self.work
 
 
-def memory_needs(scene: Scene[Any], config: TrainingConfig) -> MemoryNeeds:
-    """About how much memory training takes on a scene."""
+def memory_needs(scenes: Sequence[Scene[Any]], config: TrainingConfig) -> MemoryNeeds:
+    """About how much memory training takes on some scenes, by turns."""
+    each = [_needs_of(scene, config) for scene in scenes]
+    return MemoryNeeds(
+        pool=sum(needs.pool for needs in each),
+        state=max(needs.state for needs in each),
+        pictures=max(needs.pictures for needs in each),
+        work=sum(needs.work for needs in each),
+    )
+
+
+def _needs_of(scene: Scene[Any], config: TrainingConfig) -> MemoryNeeds:
     cells, box = len(scene.domain), scene.domain.box
     state = cells * config.rule.channels * 4
     mask = cells * config.rule.update_probability * 4
@@ -230,11 +240,13 @@ def memory_needs(scene: Scene[Any], config: TrainingConfig) -> MemoryNeeds:
     )
 
 
-def states_to_keep(scene: Scene[Any], config: TrainingConfig, budget: int | None) -> float:
+def states_to_keep(
+    scenes: Sequence[Scene[Any]], config: TrainingConfig, budget: int | None
+) -> float:
     """How many states of a rollout may be kept at a time; infinity if memory is no matter.
 
     Args:
-        scene: What is trained on.
+        scenes: What is trained on.
         config: The hyperparameters.
         budget: Bytes for the whole program, or all its tensors on a GPU; by default what it has
             and what is free. Where even that does not seem to be enough, the fewest states are
@@ -243,8 +255,8 @@ def states_to_keep(scene: Scene[Any], config: TrainingConfig, budget: int | None
     Raises:
         OptionError: If the budget given is not enough.
     """
-    device = scene.priors.device
-    used, needs = memory_used(device), memory_needs(scene, config)
+    device = scenes[0].priors.device
+    used, needs = memory_used(device), memory_needs(scenes, config)
     free = memory_free(device) if budget is None else budget - used
     room = (free / MARGIN - needs.beside_rollout) / needs.state
     fewest = fewest_kept(config.longest_rollout)
@@ -259,12 +271,12 @@ def states_to_keep(scene: Scene[Any], config: TrainingConfig, budget: int | None
     )
 
 
-def memory_advice(scene: Scene[Any], config: TrainingConfig, kept: float) -> str:
+def memory_advice(scenes: Sequence[Scene[Any]], config: TrainingConfig, kept: float) -> str:
     """What takes how much memory, and what would take less, in one line.
 
     `kept` is the number of states that rollouts may keep.
     """
-    needs, seen, longest = memory_needs(scene, config), config.pictures, config.longest_rollout
+    needs, seen, longest = memory_needs(scenes, config), config.pictures, config.longest_rollout
     kept, fewest = min(longest, kept), fewest_kept(longest)
     pool, pixels = max(1, config.pool.size // 2), max(32, seen.size // 2)
     savings = {
@@ -273,8 +285,9 @@ def memory_advice(scene: Scene[Any], config: TrainingConfig, kept: float) -> str
         f"`{seen.option}` {pixels}": needs.pictures * (1 - (pixels / seen.size) ** 2),
     }
     best = max(savings, key=lambda option: savings[option])
+    cells = sum(len(scene.domain) for scene in scenes)
     return (
-        f"for {len(scene.domain)} cells training takes {_listed(needs, config, kept)}; "
+        f"for {cells} cells training takes {_listed(needs, config, kept)}; "
         f"{best} would take up to {_size(savings[best])} less"
     )
 

@@ -6,6 +6,7 @@ Reference: VNCA section 5; slices of a solid as in Kopf et al. 2007.
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -29,7 +30,7 @@ from vnca.training.terms import MassTerm, MotionSupervision, Term
 
 
 def smoke_trainer(
-    smoke: Volume,
+    smoke: Volume | Sequence[Volume],
     style: FloatArray | Sequence[FloatArray],
     config: SmokeConfig,
     network: FeatureNetwork,
@@ -38,10 +39,12 @@ def smoke_trainer(
     memory_budget: int | None = None,
     terms: Sequence[Term] = (),
 ) -> Trainer:
-    """What trains a rule on one frame and one picture.
+    """What trains a rule on a frame and a picture, or several of either.
 
     Args:
-        smoke: The frame, which is laid on a lattice of its own.
+        smoke: The frame; or several, of one sequence or of others, which are trained on by turns.
+            Each is laid on a lattice of its own and seen as large, in cells, as the first, by whose
+            density and speed all are told what counts as 1.
         style: Linear RGB `[r, c, 3]`; or several, which the rule learns all.
         config: The hyperparameters.
         network: The frozen network that judges pictures.
@@ -53,25 +56,40 @@ def smoke_trainer(
         GridError: If there is no smoke in the frame, or it can have no place on a lattice.
         OptionError: If the memory budget is not enough.
     """
-    what = f"frame {smoke.frame}"
-    smoke = on_lattice(smoke, Lattice.of(smoke.index_to_world, what), what)
+    first, *others = map(_on_own_lattice, [smoke] if isinstance(smoke, Volume) else smoke)
     config = told_styles(config, style)
     rule = Rule.initial(
         config.rule,
-        choose_scales(smoke, config),
+        choose_scales(first, config),
         seed=config.seed,
         xavier_gain=config.xavier_gain,
     )
     rule = replace(rule, decoder=config.initial_decoder())
-    scene = SmokeScene(
-        smoke, rule, config.view, augment=config.augment, device=device, backend=config.backend
+    prepared = partial(
+        SmokeScene, view=config.view, augment=config.augment, device=device, backend=config.backend
     )
-    rule = replace(rule, place=Region(Lattice(smoke.index_to_world), scene.domain.box))
+    scene = prepared(first, rule)
+    more_scenes = [prepared(other, rule, width=scene.width) for other in others]
+    rule = replace(rule, place=Region(Lattice(first.index_to_world), scene.domain.box))
     if config.mass:
         terms = (MassTerm(config.mass), *terms)
-    if config.motion.weight and scene.moves:
+    if config.motion.weight and any(each.moves for each in (scene, *more_scenes)):
         terms = (MotionSupervision(config.motion, FlowNetwork.load(device)), *terms)
-    return Trainer(scene, rule, style, config, network, terms=terms, memory_budget=memory_budget)
+    return Trainer(
+        scene,
+        rule,
+        style,
+        config,
+        network,
+        more_scenes=more_scenes,
+        terms=terms,
+        memory_budget=memory_budget,
+    )
+
+
+def _on_own_lattice(smoke: Volume) -> Volume:
+    what = f"frame {smoke.frame}"
+    return on_lattice(smoke, Lattice.of(smoke.index_to_world, what), what)
 
 
 def choose_scales(smoke: Volume, config: SmokeConfig) -> Scales:

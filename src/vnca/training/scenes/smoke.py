@@ -66,6 +66,7 @@ class SmokeScene(Scene[SmokeViewpoint]):
         view: ViewConfig,
         *,
         augment: bool = False,
+        width: float | None = None,
         device: torch.device | str = "cpu",
         backend: str = "auto",
     ) -> None:
@@ -77,6 +78,8 @@ class SmokeScene(Scene[SmokeViewpoint]):
             view: How it is looked at; gamma is the rule's.
             augment: Whether the velocity and the density that the rule is conditioned on differ
                 from life to life of the states.
+            width: Cells across a picture; by default those of the smoke from any side, or fewer as
+                the view asks for.
             device: Where rollouts and pictures are computed.
             backend: What decodes.
 
@@ -96,9 +99,10 @@ class SmokeScene(Scene[SmokeViewpoint]):
                 dilation=rule.config.dilation,
                 box=box,
             )
-        width = view_width(self.box, smoke.index_to_world)
-        if view.pixels_per_cell is not None:
-            width = min(width, view.size / view.pixels_per_cell)
+        if width is None:
+            width = view_width(self.box, smoke.index_to_world)
+            if view.pixels_per_cell is not None:
+                width = min(width, view.size / view.pixels_per_cell)
         super().__init__(
             domain,
             priors(domain, smoke, rule),
@@ -187,6 +191,8 @@ class SmokeScene(Scene[SmokeViewpoint]):
         camera = level_turntable(*self._corners, azimuth, elevation)
         if self.width < camera.height:
             camera = self._closer(camera, random)
+        elif self.width > camera.height:
+            camera = dataclasses.replace(camera, height=self.width)
         # Samples at random depths: no pattern can hide between them.
         offset = float(random.uniform()) if self.view.mode == "emission-absorption" else 0.0
         thinness = 1.0
