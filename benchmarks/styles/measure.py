@@ -117,12 +117,10 @@ def table(rows: dict[str, dict[str, str]]) -> str:
     ]
     for name, row in sorted(rows.items()):
         number = {key: float(value) for key, value in row.items() if key in MEASURES and value}
-        over = number["warp_long"] / float(row["warp_long_smoke"])
         cells = (
             name.replace("_", " "),
             f"{number['warp_short']:.2f}",
-            f"{number['warp_long']:.2f}",
-            _bold(f"{over:.2f}", over > WARP),
+            *_long_warp(row),
             f"{number['flow']:.1f}",
             f"{number['direction']:.2f}" if "direction" in number else "not measured",
             _bold(f"{number['spread']:.1%}".replace("%", " %"), number["spread"] > SPREAD),
@@ -133,6 +131,15 @@ def table(rows: dict[str, dict[str, str]]) -> str:
         )
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def _long_warp(row: dict[str, str]) -> tuple[str, str]:
+    """The error over seven frames, and over that of the smoke; too few frames have none."""
+    if not row["warp_long"]:
+        return "not measured", "not measured"
+    error = float(row["warp_long"])
+    over = error / float(row["warp_long_smoke"])
+    return f"{error:.2f}", _bold(f"{over:.2f}", over > WARP)
 
 
 def _bold(text: str, wanted: bool) -> str:

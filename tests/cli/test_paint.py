@@ -14,6 +14,7 @@ from vnca.io import read_smoke, write_smoke
 from vnca.io.vdb import open_vdb
 from vnca.painting import Roll, RollState
 from vnca.recipe import Silent
+from vnca.recipe.sequence import fullest_frame
 from vnca.rule.model import MODEL_NAME, Model
 from vnca.training.loop import Progress, Trainer
 
@@ -217,6 +218,20 @@ def test_motion_that_cannot_be_blurred_is_said_before_training(job: Job) -> None
     done = job.run("--shutter", 0.5, "--velocity-grid", "none")
     assert "no velocity, which --shutter needs" in done.complaint
     assert not job.out.exists()
+
+
+def test_the_frame_to_train_on_is_looked_for_once(
+    job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = []
+
+    def counted(*given: Any) -> Any:
+        found.append(given)
+        return fullest_frame(*given)
+
+    monkeypatch.setattr("vnca.recipe.paint.fullest_frame", counted)
+    assert job.run("--shutter", 0.5, "--only", "train").code == 0
+    assert len(found) == 1
 
 
 def test_a_film_is_shaped_or_left_out(vnca: Vnca, smoke: Path, tmp_path: Path) -> None:

@@ -2,9 +2,10 @@
 
 import dataclasses
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -255,20 +256,20 @@ def run(options: PaintRun, watch: Watch, ranks: Ranks | None = None) -> Iterator
     if ranks.size > 1 and not paints:
         raise OptionError("mpirun: ranks share the painting alone; do it with `only` paint")
     sequence = open_sequence(options.sequence, options.frames, watch)
+    frame = cache(partial(_training_frame, options, sequence))  # Found by reading some of them.
     is_filmed = not options.without_film and options.only != "paint"
     if is_filmed and options.film.shutter and not options.is_trained:
         # Said before minutes of training, not after them.
-        require_velocity(read_smoke(_training_frame(options, sequence).path, options.smoke))
+        require_velocity(read_smoke(frame().path, options.smoke))
     goes_on = _begin(options)
     model, smoke, scales = options.picture or Path(options.name), options.smoke, painting.Scales()
     style = None
     if options.style is not None:
         style = load_style(options.style)
-        frame = _training_frame(options, sequence).path
-        scales = painting.Scales.fitted(frame, smoke, CELL_OPACITY["painted"])
+        scales = painting.Scales.fitted(frame().path, smoke, CELL_OPACITY["painted"])
     elif not options.is_trained:
         try:
-            model = _trained(options, sequence, watch, goes_on=goes_on)
+            model = _trained(options, frame, watch, goes_on=goes_on)
             if options.only == "train":
                 return
         except KeyboardInterrupt:
@@ -346,7 +347,7 @@ def _asked(options: PaintRun) -> dict[str, Any]:
     return asked
 
 
-def _trained(options: PaintRun, sequence: FrameSequence, watch: Watch, *, goes_on: bool) -> Path:
+def _trained(options: PaintRun, frame: Callable[[], Frame], watch: Watch, *, goes_on: bool) -> Path:
     """The folder of a run that has come to its end."""
     # Painting with a model needs no torch.
     from vnca.recipe import smoke
@@ -362,11 +363,10 @@ def _trained(options: PaintRun, sequence: FrameSequence, watch: Watch, *, goes_o
         again = smoke.ResumeSmokeRun(resume=folder, memory_budget=options.memory_budget)
         smoke.resume_run(again, watch)
     elif not (goes_on and (folder / MODEL_NAME).exists()):
-        frame = _training_frame(options, sequence)
-        watch.note(f"training on {frame.path}")
+        watch.note(f"training on {frame().path}")
         config = dataclasses.replace(preset(SmokeConfig, options.preset), seed=options.seed)
         asked = smoke.SmokeRun(
-            frame=frame.path,
+            frame=frame().path,
             style=options.picture or Path(),
             out=folder,
             preset=options.preset,
