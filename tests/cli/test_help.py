@@ -67,7 +67,8 @@ def test_help_groups_options_and_tells_defaults_of_the_preset(vnca: Vnca) -> Non
 
 def test_going_on_with_a_training_has_a_help_of_its_own(vnca: Vnca) -> None:
     text = vnca("train", "--resume", "run", "--help").out
-    assert listed(text) == {"--resume", "--memory-budget", "--frame", "--style", "--more-styles"}
+    inputs = {"--frame", "--more-frames", "--style", "--more-styles"}
+    assert listed(text) == {"--resume", "--memory-budget", *inputs}
 
 
 def test_short_forms_are_the_long_ones(vnca: Vnca, tmp_path: Path) -> None:

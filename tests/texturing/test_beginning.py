@@ -16,7 +16,7 @@ def test_the_texture_is_of_the_rule_and_the_picture_that_smoke_is_trained_with()
         iterations=50,
         texture=2.5,
         seed=3,
-        appearance=AppearanceConfig(style_scale=0.75),
+        appearance=AppearanceConfig(style_scale=0.75, style=0.5, distribution=2.0, grey=True),
     )
     texture = pretraining_config(config, picture=60)
     assert texture is not None
@@ -27,6 +27,8 @@ def test_the_texture_is_of_the_rule_and_the_picture_that_smoke_is_trained_with()
     assert texture.rule.sobel_divisor == config.rule.sobel_divisor
     assert 0 < texture.steadiness < 0.5 * config.steadiness  # or it stays what it began with
     assert texture.appearance.style_scale * texture.slice.cells == pytest.approx(60)
+    told = replace(texture.appearance, style_scale=0.75, grey=True)
+    assert told == config.appearance  # but for what shapes a density, compared by the same terms
 
 
 def test_the_patterns_of_a_large_picture_are_kept_within_the_block() -> None:

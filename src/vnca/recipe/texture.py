@@ -65,7 +65,8 @@ def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | N
     """How the texture is trained for a training on smoke, or None if it is not to be.
 
     Args:
-        config: The training on smoke. The rule is as large, and the picture in cells too.
+        config: The training on smoke. The rule is as large, and the picture in cells too; it is
+            compared with by the same terms.
         picture: Cells along its shorter side, as the smoke is shown it.
     """
     iterations = round(config.texture * config.iterations)
@@ -79,8 +80,8 @@ def pretraining_config(config: SmokeConfig, picture: float) -> TextureConfig | N
             config.rule, position_prior=False, density_prior=False, velocity_prior=False
         ),
         appearance=dataclasses.replace(
-            plain.appearance,
-            layers=config.appearance.layers,
+            config.appearance,
+            grey=plain.appearance.grey,
             style_scale=picture / plain.slice.cells,
         ),
         decoder=config.decoder,
