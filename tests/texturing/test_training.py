@@ -12,6 +12,7 @@ from vnca.features.vgg import VGG16
 from vnca.losses.appearance import AppearanceConfig
 from vnca.rule import DENSITY_CHANGE
 from vnca.training.config import PoolConfig, TextureConfig
+from vnca.training.ground import Ground
 from vnca.training.loop import Trainer
 from vnca.training.run import preview_sheet
 from vnca.training.scenes import Scene
@@ -119,7 +120,7 @@ def test_exploded_states_are_told_and_do_not_stay(trainer: Make) -> None:
     )
     steps = list(training.run())
     assert any(step.exploded for step in steps)
-    assert all(state.abs().max() <= 2 for state in training._pool._states.values())
+    assert all(state.abs().max() <= 2 for state in training._grounds[0].pool._states.values())
     assert all(np.isfinite(w).all() for w in weights(training))
 
 
@@ -128,9 +129,9 @@ def test_states_live_on_from_iteration_to_iteration(trainer: Make) -> None:
     starts: list[bool] = []
     roll = training._roll
 
-    def look(state: torch.Tensor, steps: range, scene: Scene[Any]) -> torch.Tensor:
+    def look(ground: Ground, state: torch.Tensor, steps: range, scene: Scene[Any]) -> torch.Tensor:
         starts.append(bool(state.any()))
-        return roll(state, steps, scene)
+        return roll(ground, state, steps, scene)
 
     training._roll = look  # type: ignore[method-assign,assignment]
     list(training.run())
