@@ -3,9 +3,10 @@
 python benchmarks/styles/build.py SMOKE OUT NAME=RUN ...
 
 SMOKE is a frame that thumbnails are painted on, OUT the folder of the library, RUN the folder of a
-training: of a picture here, drawn by pictures.py, or in the package. All learned on four smokes by
-turns, frame 45 of one made in Blender and frame 30 of three that `vnca simulate` makes of 48 cells
-across. Stained glass, church and embers went on from the style of the same name as it was before:
+training: of a picture here, drawn by pictures.py, or in the package. The ink is from an earlier
+version. All others learned on four smokes by turns, frame 45 of one made in Blender and frame 30 of
+three that `vnca simulate` makes of 48 cells across. Stained glass, church and embers went on from
+the style of the same name as it was before:
 
     vnca train FRAME PICTURE -o RUN --init STYLE --more-frames BILLOWY JET SPHERE
         --iterations 240 --pool.reseed-every 40 --pool.size 2 -s 1

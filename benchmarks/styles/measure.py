@@ -227,7 +227,7 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("styles", nargs="*", help="all unless given")
     add_models(parser)
     add_size(parser)
-    return parser.parse_args()
+    return parser.parse_intermixed_args()
 
 
 if __name__ == "__main__":
