@@ -47,9 +47,21 @@ def test_it_tells_what_it_was_trained_on(vnca: Vnca, asked: list[object], tmp_pa
 
 
 def test_one_that_was_interrupted_ends_as_if_it_had_not(
-    vnca: Vnca, asked: list[object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    vnca: Vnca,
+    asked: list[object],
+    smoke: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """With a velocity scale that is fitted to the first frame, and would not fit the last."""
     whole, run, improve = tmp_path / "whole", tmp_path / "run", Trainer.improve
+    volume = read_smoke(smoke / "ball_0001.vdb")
+    x, y, z = volume.origin
+    faster = [tmp_path / f"faster_000{number}.vdb" for number in (1, 2)]
+    for number, path in enumerate(faster):
+        write_smoke(path, replace(volume, origin=(x, y, z + 2 * number), frame=number))
+    last = faster[0]
+    asked = [*asked[:-3], "--velocity-scale", "fit", *asked[-3:-1], last]
     assert vnca("train", *asked, "--out", whole).code == 0
 
     def interrupted(self: Trainer) -> Progress:
@@ -60,10 +72,8 @@ def test_one_that_was_interrupted_ends_as_if_it_had_not(
     with monkeypatch.context() as patch:
         patch.setattr(Trainer, "improve", interrupted)
         assert vnca("train", *asked, "--out", run).code == 130
-    last = asked[-1]
-    assert isinstance(last, Path)
     kept = last.read_bytes()
-    last.write_bytes(last.with_name("ball_0001.vdb").read_bytes())
+    last.write_bytes((smoke / "ball_0003.vdb").read_bytes())
     complaint = vnca("train", "--resume", run).complaint
     assert "the further frames changed since this training began" in complaint
     assert (run / CHECKPOINT_NAME).exists()

@@ -66,7 +66,7 @@ def read_alone(path: Path, smoke: SmokeFormat, watch: Watch) -> Volume:
 
 def frames_alone(
     paths: Sequence[Path],
-    formats: Sequence[SmokeFormat],
+    smoke: SmokeFormat,
     watch: Watch,
     volumes: Sequence[Volume] | None = None,
 ) -> list[Volume]:
@@ -74,7 +74,7 @@ def frames_alone(
 
     Args:
         paths: Their files, or what stands in their place.
-        formats: How each is read.
+        smoke: How they are read.
         watch: Is told of those whose voxels are not cells.
         volumes: The frames, if they need not be read.
 
@@ -83,7 +83,7 @@ def frames_alone(
             some have a velocity; or if their densities are surely in different units.
     """
     if volumes is None:
-        frames = [read_alone(*read, watch) for read in zip(paths, formats, strict=True)]
+        frames = [read_alone(path, smoke, watch) for path in paths]
     else:
         lattices = [Lattice.of(volume.index_to_world, "the frame") for volume in volumes]
         given = zip(volumes, lattices, strict=True)
@@ -93,10 +93,12 @@ def frames_alone(
             raise GridError(
                 f"{path}: there is no smoke in this frame to train on; choose a later one"
             )
-        if (frame.velocity is None) != (frames[0].velocity is None):
+    first, *others = frames
+    for path, frame in zip(paths[1:], others, strict=True):
+        if (frame.velocity is None) != (first.velocity is None):
             without = path if frame.velocity is None else paths[0]
             raise GridError(f"{without}: has no velocity, as another of the frames has")
-        times = density_scale(frame.density) / density_scale(frames[0].density)
+        times = density_scale(frame.density) / density_scale(first.density)
         if not 1 / MOST_APART <= times <= MOST_APART:
             raise GridError(
                 f"{path}: has {times:g} times the density of {paths[0]}; both have to be in the "

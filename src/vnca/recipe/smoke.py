@@ -209,8 +209,8 @@ def run(
     styles = pictures or [read_style(path) for path in (options.style, *options.more_styles)]
     device = choose_device(options.device)
     paths = (options.frame, *options.more_frames)
-    formats = [beside(path, options.smoke) if volumes is None else options.smoke for path in paths]
-    smoke, smoke_format = frames_alone(paths, formats, watch, volumes), formats[0]
+    smoke_format = options.smoke if volumes is not None else beside(options.frame, options.smoke)
+    smoke = frames_alone(paths, smoke_format, watch, volumes)
     config = shared_out(told_styles(options.config, styles), len(styles))
     if len(styles) > 1:
         watch.note(f"{len(styles)} styles: {config.iterations} iterations")

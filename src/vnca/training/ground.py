@@ -1,6 +1,5 @@
 """Where states live: a scene with its pool, and what rolls the states out on it."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +32,7 @@ class Ground:
     def of(
         cls,
         scene: Scene[Any],
-        opened: Callable[[Scene[Any]], Session],
+        session: Session,
         config: TrainingConfig,
         *,
         styles: int,
@@ -43,14 +42,14 @@ class Ground:
 
         Args:
             scene: What is trained on.
-            opened: Gives the session on a scene.
+            session: What computes the automaton there.
             config: The hyperparameters.
             styles: How many the rule learns.
             random: What slots of the pool are drawn from.
         """
         return cls(
             scene,
-            opened(scene),
+            session,
             Pool(scene.seed(config.rule.channels), config.pool, random),
             Lessons(styles, scene.domain, config.seed) if config.rule.style_columns else None,
         )

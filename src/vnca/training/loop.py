@@ -141,7 +141,7 @@ class Trainer:
         self.terms = (*own, *terms)
         styles = len(self.appearances)
         self._grounds = [
-            Ground.of(each, self._session, config, styles=styles, random=self._random)
+            Ground.of(each, self._session(each), config, styles=styles, random=self._random)
             for each in self.scenes
         ]
         self._descent = self._fresh_descent()
