@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vnca.core.camera import Orthographic, Perspective, frame_box, turntable
+from vnca.core.camera import Orthographic, Perspective, frame_box, turntable, view_axes
 from vnca.core.errors import OptionError
 
 ANGLES = (st.floats(-360, 360), st.floats(-90, 90))
@@ -129,3 +129,13 @@ def test_a_turntable_is_no_farther_away_than_its_widest_view_asks_for() -> None:
 def test_impossible_cameras_are_refused(make) -> None:
     with pytest.raises(OptionError):
         make()
+
+
+@pytest.mark.parametrize("field_of_view", [None, 40.0])
+def test_the_height_of_a_camera_is_what_it_shows_at_its_target(field_of_view) -> None:
+    camera = frame_box((0, 0, 0), (4, 9, 5), 30, 20, field_of_view=field_of_view)
+    _, up, _ = view_axes(30, 20)
+    edges = np.array(camera.target) + np.outer([0.5, -0.5], camera.height * up)
+    row, column, _ = camera.project(edges, 64, 48)
+    np.testing.assert_allclose(row, [-0.5, 63.5], atol=1e-9)
+    np.testing.assert_allclose(column, 23.5, atol=1e-9)

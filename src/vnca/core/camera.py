@@ -32,6 +32,11 @@ class Camera(Protocol):
     near: ClassVar[float]
     """Depth before which nothing is seen."""
 
+    @property
+    def height(self) -> float:
+        """Length between the top and the bottom edge of the picture, at the target."""
+        ...
+
     def rays(self, rows: int, columns: int) -> tuple[AnyArray, AnyArray]:
         """One ray through each pixel centre: `point = origin + depth * direction`.
 
@@ -124,6 +129,11 @@ class Perspective(_LookAt):
         if not self.distance > 0:
             raise OptionError(f"camera distance: expected more than 0, got {self.distance}")
         _check_field_of_view(self.field_of_view)
+
+    @property
+    def height(self) -> float:
+        """See `Camera.height`."""
+        return 2 * self.distance * _slope(self.field_of_view)
 
     def rays(self, rows: int, columns: int) -> tuple[AnyArray, AnyArray]:
         """See `Camera.rays`."""

@@ -13,6 +13,7 @@ from vnca.core.camera import Orthographic, turntable
 from vnca.core.errors import GridError
 from vnca.core.volume import Volume
 from vnca.painting import Painting
+from vnca.rendering import rays_along
 from vnca.rendering.view import projected_velocity, render
 from vnca.rule import SMOKE_THRESHOLD, Rule
 from vnca.training.scenes.smoke import smoke_bounds
@@ -164,6 +165,7 @@ class Setup:
             columns=self.size,
             gamma=self.gamma,
             step=STEP,
+            supersampling=rays_along(1 / self.scale),
         )
         return Seen(view.colour.numpy(), view.opacity.numpy(), view.depth.numpy())
 

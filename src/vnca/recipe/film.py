@@ -17,6 +17,7 @@ from vnca.core.volume import Volume
 from vnca.io import SmokeFormat
 from vnca.io.film import FilmWriter
 from vnca.io.smoke_format import NO_VELOCITY
+from vnca.rendering import MOST_RAYS, rays_along
 from vnca.rendering.film import Picture, render, require_renderer
 from vnca.rendering.light import Light, LightVolume, spacing_for
 from vnca.rendering.shutter import blurred
@@ -64,6 +65,9 @@ class FilmConfig(Shot):
     step: float = 0.5
     """Distance between samples along a ray, in cells, across where these are thinnest; a surface
     shows terraces where it is long."""
+    supersampling: int | None = None
+    """Rays along the rows and the columns of a pixel, 1 to 4; unless given, as many as there are
+    cells across one: single rays miss some cells, and others a frame later."""
     light: float = 1.5
     """Strength of a light that the smoke is seen by and throws shadows in. 0: none, the smoke glows
     in its own colours before an even background."""
@@ -84,6 +88,10 @@ class FilmConfig(Shot):
             raise OptionError(f"`film.field_of_view` {self.field_of_view}: must be 0 to 120")
         if not 0 < self.step <= 4:
             raise OptionError(f"`film.step` {self.step}: must be above 0, at most 4 cells")
+        if self.supersampling is not None and not 1 <= self.supersampling <= MOST_RAYS:
+            raise OptionError(
+                f"`film.supersampling` {self.supersampling}: must be from 1 to {MOST_RAYS}"
+            )
         if not 0 <= self.light < inf:
             raise OptionError(f"`film.light` {self.light}: must be 0 or more")
         if not isfinite(self.light_azimuth):
@@ -262,6 +270,7 @@ def picture(
         gamma=gamma,
         step=config.step,
         cells_to_world=place,
+        supersampling=config.supersampling or rays_along(camera.height / config.rows),
         light=light,
         device=device,
     )

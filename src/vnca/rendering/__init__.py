@@ -3,6 +3,7 @@
 Here is what both have in common. It needs no torch, and neither do films where the native core is.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ UNSEEN = 5e-4
 """What gets less light through than this is left out: an eighth of a step of 8-bit colour."""
 THINNEST = 1e-12
 """Density this thin is invisible; below it nothing is divided by it."""
+MOST_RAYS = 4
+"""Along the rows and the columns of a pixel of a film."""
 # Where the samples of a pixel begin, in steps: each finer grid fills the gaps of the one before.
 _STAGGER = 0.618034
 
@@ -106,6 +109,14 @@ def moved_cells(
     )
     # Behind a pinhole there is no picture.
     return np.nan_to_num(np.stack([column_after - column, row_after - row], axis=-1))
+
+
+def rays_along(pixel: float) -> int:
+    """Rays along the side of a pixel so many cells wide, for what is finer not to flicker.
+
+    None is further from the next than a cell, unless that takes more than `MOST_RAYS`.
+    """
+    return min(MOST_RAYS, max(1, math.ceil(pixel - 1e-6)))
 
 
 def staggered(offset: float, along: int, rows: int, columns: int) -> AnyArray:
