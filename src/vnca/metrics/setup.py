@@ -157,15 +157,16 @@ class Setup:
             return Seen(
                 np.repeat(nothing[..., None], 3, -1), nothing, np.full_like(nothing, np.inf)
             )
+        camera = self.camera(viewpoint, smoke.origin)
         view = render(
             torch.from_numpy(smoke.density),
             torch.from_numpy(smoke.colour),
-            self.camera(viewpoint, smoke.origin),
+            camera,
             rows=self.size,
             columns=self.size,
             gamma=self.gamma,
             step=STEP,
-            supersampling=rays_along(1 / self.scale),
+            supersampling=rays_along(camera.height / self.size),
         )
         return Seen(view.colour.numpy(), view.opacity.numpy(), view.depth.numpy())
 
