@@ -23,8 +23,8 @@ Two went on from there. The harvest, twice, the second time with `-s 3`:
     vnca train FRAME PICTURE -o LONGER --init RUN --more-frames BILLOWY JET SPHERE
         --iterations 600 --pool.reseed-every 40 -s 2
 
-The stained glass with `--view.thinnest 0.03` besides; it is `stained_glass=LONGER+LONGER+RUN`,
-as the longer training alone has too much lead after some seconds of a film.
+The stained glass with `--view.thinnest 0.03` besides; it is `stained_glass=LONGER+RUN`, as the
+longer training alone has too much lead after some seconds of a film.
 
 The woodcut has `--appearance.style-scale 2 --appearance.style 1` in both: by distributions alone
 its lines become blots.
