@@ -13,6 +13,7 @@ from PIL import Image
 import vnca
 from vnca.core.volume import Volume
 from vnca.io.picture import read_image
+from vnca.rule.library import load_style
 from vnca.rule.model import MODEL_NAME
 from vnca.training.checkpoint import CHECKPOINT_NAME
 
@@ -112,6 +113,18 @@ def test_the_whole_job_in_five_lines(
     assert {row.split()[0] for row in rows} == {measure.name for measure in found.measures}
     assert found["style.score"] is not None
     assert not [*tmp_path.glob("**/" + MODEL_NAME)]
+
+
+def test_a_style_of_the_library_goes_on_learning_by_its_name(cache: Path, picture: Path) -> None:
+    shape_of_the_library = {"rule": {}, "iterations": 1}
+    model = vnca.train(
+        cache / "ball_0002.vdb", picture, init="frost", **(TINY | shape_of_the_library)
+    )
+    before, after = load_style("frost").rule, model.rule
+    assert before.config == after.config
+    assert (before.hidden != after.hidden).any()
+    # One iteration moves a weight by no more than the rate.
+    np.testing.assert_allclose(after.hidden, before.hidden, atol=0.01)
 
 
 def test_memory_and_files_give_the_same(cache: Path, picture: Path, tmp_path: Path) -> None:

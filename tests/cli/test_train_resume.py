@@ -369,6 +369,8 @@ def test_a_texture_that_cannot_be_begun_with_is_refused(
     assert f"--init {run}" in complaint
     assert "in place of 9" in complaint
     assert "one of them" in vnca(*other, "--texture", 1).complaint
+    complaint = vnca(*options, "--out", tmp_path / "other", "--init", "iink").complaint
+    assert "--init iink: no such file, nor a style of the library (cafe, church" in complaint
     assert not (tmp_path / "other").exists()
 
 

@@ -23,7 +23,7 @@ from vnca.io.smoke_format import up_axis_of
 from vnca.painting import Roll
 from vnca.recipe import Watch
 from vnca.rule import Rule
-from vnca.rule.library import load_style, style_names
+from vnca.rule.library import style_or_model
 from vnca.rule.mixing import require_blendable
 from vnca.rule.model import Model
 from vnca.rule.styles import style_number
@@ -140,19 +140,9 @@ def _blended(name: str, first: Model) -> Rule:
         OptionError: If there is no such model, or it has nothing in common with the first.
         ModelError: If a file is no model.
     """
-    model = _model(name, "blend")
+    model = style_or_model(name, "blend")
     require_blendable(first, model, f"`blend` {name}")
     return model.rule
-
-
-def _model(name: str, option: str) -> Model:
-    """A style of the library, or a model by its path."""
-    styles = style_names()
-    if name not in styles and not Path(name).exists():
-        raise OptionError(
-            f"`{option}` {name}: no such file, nor a style of the library ({', '.join(styles)})"
-        )
-    return load_style(name) if name in styles else Model.load(name)
 
 
 def _layer(name: str, first: Rule, refine: int) -> Model:
@@ -162,7 +152,7 @@ def _layer(name: str, first: Rule, refine: int) -> Model:
         OptionError: If there is no such style or model, or it cannot be laid over the first.
         ModelError: If a file is no model.
     """
-    model = _model(name, "layers")
+    model = style_or_model(name, "layers")
     if refine > 1 and (model.rule.decoder is None) is not (first.decoder is None):
         raise OptionError(
             f"`layers` {name}: of it and the first rule only one has a decoder, so they run on "

@@ -77,9 +77,10 @@ class SmokeRun(TrainingOptions):
     preset: str = DEFAULT
     """Values of all hyperparameters that are not given: draft, standard, paper, authors, or a TOML
     file."""
-    init: Path | None = None
+    init: str | None = None
     """A model that is trained already, to begin with instead of training a texture as `texture`
-    says: a solid texture of the picture, or a model of smoke, which goes on learning."""
+    says: a solid texture of the picture, or a model of smoke, which goes on learning; or the name
+    of a style of the library (`vnca styles` lists them)."""
     smoke: SmokeFormat = field(default_factory=SmokeFormat)
     """How smoke is read from files."""
     config: SmokeConfig = field(default_factory=SmokeConfig)
@@ -128,7 +129,7 @@ def train(
         preset: `draft` takes minutes, `standard` a night on a laptop; `paper` is the paper's. Or
             the path of a TOML file.
         init: A texture model of the picture to begin with, instead of training one first; or a
-            model of smoke, which goes on learning.
+            model of smoke, or a style of the library by its name, which goes on learning.
         overwrite: Replace the run that `out` holds.
         resume: Go on with the training that was interrupted in `out`, with the options that it
             began with, or else begin it.
@@ -158,7 +159,7 @@ def train(
         more_styles=tuple(others),
         out=None if out is None else Path(out),
         preset=str(preset),
-        init=None if init is None else Path(init),
+        init=None if init is None else str(init),
         overwrite=overwrite,
         preview_every=preview_every,
         device=device,

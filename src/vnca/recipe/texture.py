@@ -37,7 +37,7 @@ from vnca.recipe.session import (
 )
 from vnca.rule import Rule
 from vnca.rule.conditioning import STYLES
-from vnca.rule.library import load_style, nearest_style, style_names
+from vnca.rule.library import nearest_style, style_or_model
 from vnca.rule.mixing import origins
 from vnca.rule.model import Model
 from vnca.rule.styles import in_style
@@ -122,23 +122,23 @@ def without_prior_weights(rule: Rule, conditioning: Sequence[str] | None = None)
     return dataclasses.replace(rule, hidden=hidden, config=config)
 
 
-def begin_with_model(trainer: Trainer, path: Path) -> None:
+def begin_with_model(trainer: Trainer, name: str) -> None:
     """Let a training on smoke begin with a model.
 
     A rule of smoke keeps what it has learnt of priors; a texture has had none.
 
     Args:
         trainer: Before its first iteration.
-        path: Of the model, or of the folder of its run.
+        name: Of a style of the library, or the path of the model or of the folder of its run.
 
     Raises:
         VncaError: If it cannot be read, or is a rule of another shape.
     """
-    model, wanted = Model.load(path), trainer.rule()
+    model, wanted = style_or_model(name, "init"), trainer.rule()
     rule, its = model.rule, model.rule.config
     misfit = _misfit(rule, wanted)
     if misfit is not None:
-        raise OptionError(f"`init` {path}: {misfit}")
+        raise OptionError(f"`init` {name}: {misfit}")
     known = (name for name in its.conditioning if name not in STYLES)
     knows_smoke = any(map(its.is_conditioned_on, known))
     if not (knows_smoke and its.conditioning == wanted.config.conditioning):
@@ -179,20 +179,16 @@ def graft(
     wanted = trainer.rule()
     if source == "none":
         return None
-    if source in (AUTO, *style_names()):
-        is_auto = source == AUTO
-        name = nearest_style(linear_to_srgb(style.clip(0, 1))) if is_auto else source
-        model = load_style(name)
-        misfit = _misfit(model.rule, wanted)
-        if is_auto and misfit is not None:
+    chosen = source == AUTO
+    name = nearest_style(linear_to_srgb(style.clip(0, 1))) if chosen else source
+    model = style_or_model(name, "graft")
+    misfit = _misfit(model.rule, wanted)
+    if misfit is not None:
+        if chosen:
             watch.note("no style of the library has such a rule; training starts from nothing")
             return None
-        what = f"`graft` {name}"
-    else:
-        model, name = Model.load(Path(source)), Path(source).name
-        misfit, what = _misfit(model.rule, wanted), f"`graft` {source}"
-    if misfit is not None:
-        raise OptionError(f"{what}: {misfit}")
+        raise OptionError(f"`graft` {name}: {misfit}")
+    name = Path(name).name
     if not goes_on:
         watch.note(f"starting from the rule of {name}")
         rule = without_prior_weights(model.rule, wanted.config.conditioning)

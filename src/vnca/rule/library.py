@@ -1,6 +1,7 @@
 """The library of styles: models that come with the package."""
 
 from importlib.resources import as_file, files
+from pathlib import Path
 
 import numpy as np
 
@@ -36,6 +37,27 @@ def load_style(name: str) -> Model:
     require_style(name)
     with as_file(_FOLDER.joinpath(name + SUFFIX)) as path:
         return Model.load(path)
+
+
+def style_or_model(name: str, option: str) -> Model:
+    """A style of the library by its name, or else a model by its path.
+
+    Args:
+        name: Of the style, the model file or the folder of its run.
+        option: Where it is asked for, to say so if there is no such thing.
+
+    Raises:
+        OptionError: If there is neither a style nor a file of that name.
+        ModelError: If the file is no model.
+    """
+    styles = style_names()
+    if name in styles:
+        return load_style(name)
+    if not Path(name).exists():
+        raise OptionError(
+            f"`{option}` {name}: no such file, nor a style of the library ({', '.join(styles)})"
+        )
+    return Model.load(name)
 
 
 def style_bytes(name: str) -> bytes:
