@@ -28,6 +28,12 @@ def test_projection_puts_a_point_on_a_ray_back_on_its_pixel(camera, size) -> Non
         np.testing.assert_allclose(found, depth, rtol=1e-5)
 
 
+@pytest.mark.parametrize("camera", CAMERAS, ids=["orthographic", "perspective"])
+def test_a_band_of_rays_is_part_of_the_whole(camera) -> None:
+    for part, whole in zip(camera.rays(7, 4, slice(2, 5)), camera.rays(7, 4), strict=True):
+        np.testing.assert_array_equal(part, whole[2:5])
+
+
 @pytest.mark.parametrize("perspective", [False, True])
 @pytest.mark.parametrize(
     ("angles", "right", "top"),

@@ -169,6 +169,16 @@ def test_threads_do_not_change_a_bit() -> None:
             np.testing.assert_array_equal(one, two)
 
 
+@pytest.mark.parametrize("most", [1, 300, 450])
+def test_bands_of_a_picture_do_not_change_a_bit(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    density, colour = smoke()
+    how: dict[str, Any] = {"rows": 20, "columns": 26, "gamma": 0.8, "supersampling": 2}
+    at_once = film.render(density, colour, camera_of(None, *SIDES[1]), **how)
+    monkeypatch.setattr(film, "_RAYS_AT_ONCE", most)
+    in_bands = film.render(density, colour, camera_of(None, *SIDES[1]), **how)
+    np.testing.assert_array_equal(in_bands.rgba, at_once.rgba)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [{"gamma": -1.0}, {"gamma": np.nan}, {"step": 0.0}, {"rows": 0}],

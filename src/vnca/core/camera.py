@@ -23,6 +23,8 @@ from vnca.core.colour import srgb_to_linear
 from vnca.core.errors import OptionError
 
 Point = tuple[float, float, float]
+WHOLE = slice(None)
+"""The band of a picture that is all of it."""
 
 
 @runtime_checkable
@@ -37,11 +39,17 @@ class Camera(Protocol):
         """Length between the top and the bottom edge of the picture, at the target."""
         ...
 
-    def rays(self, rows: int, columns: int) -> tuple[AnyArray, AnyArray]:
+    def rays(self, rows: int, columns: int, band: slice = WHOLE) -> tuple[AnyArray, AnyArray]:
         """One ray through each pixel centre: `point = origin + depth * direction`.
 
+        Args:
+            rows: Of the picture.
+            columns: Of the picture.
+            band: Through which rows of pixels; all unless given.
+
         Returns:
-            Origins and unit directions, both `[rows, columns, 3]`, float64: a world may be large.
+            Origins and unit directions, both `[rows of the band, columns, 3]`, float64: a world may
+            be large.
         """
         ...
 
@@ -91,10 +99,10 @@ class Orthographic(_LookAt):
         if not self.height > 0:
             raise OptionError(f"camera height: expected more than 0, got {self.height}")
 
-    def rays(self, rows: int, columns: int) -> tuple[AnyArray, AnyArray]:
+    def rays(self, rows: int, columns: int, band: slice = WHOLE) -> tuple[AnyArray, AnyArray]:
         """See `Camera.rays`."""
         right, up, forward = view_axes(self.azimuth, self.elevation)
-        x, y = (self.height * offset for offset in _pixel_offsets(rows, columns))
+        x, y = (self.height * offset for offset in _pixel_offsets(rows, columns, band))
         origins = np.asarray(self.target) + x[..., None] * right + y[..., None] * up
         return origins, np.broadcast_to(forward, origins.shape)
 
@@ -135,11 +143,11 @@ class Perspective(_LookAt):
         """See `Camera.height`."""
         return 2 * self.distance * _slope(self.field_of_view)
 
-    def rays(self, rows: int, columns: int) -> tuple[AnyArray, AnyArray]:
+    def rays(self, rows: int, columns: int, band: slice = WHOLE) -> tuple[AnyArray, AnyArray]:
         """See `Camera.rays`."""
         right, up, forward = view_axes(self.azimuth, self.elevation)
         extent = 2 * _slope(self.field_of_view)
-        x, y = (extent * offset for offset in _pixel_offsets(rows, columns))
+        x, y = (extent * offset for offset in _pixel_offsets(rows, columns, band))
         directions = forward + x[..., None] * right + y[..., None] * up
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         pinhole = np.asarray(self.target) - self.distance * forward
@@ -288,11 +296,12 @@ def _fit(across: AnyArray, forward: AnyArray, slope: float) -> tuple[float, floa
     return (above - below) / 2, (above + below) / (2 * slope)
 
 
-def _pixel_offsets(rows: int, columns: int) -> tuple[AnyArray, AnyArray]:
-    """Right and up from the middle to each pixel centre, in picture heights."""
+def _pixel_offsets(rows: int, columns: int, band: slice) -> tuple[AnyArray, AnyArray]:
+    """Right and up from the middle to the centre of each pixel of a band, in picture heights."""
     x = (np.arange(columns) + 0.5 - columns / 2) / rows
-    y = (rows / 2 - 0.5 - np.arange(rows)) / rows
-    return np.broadcast_to(x, (rows, columns)), np.broadcast_to(y[:, None], (rows, columns))
+    y = (rows / 2 - 0.5 - np.arange(rows)[band, None]) / rows
+    size = (len(y), columns)
+    return np.broadcast_to(x, size), np.broadcast_to(y, size)
 
 
 def _pixel(x: AnyArray, y: AnyArray, rows: int, columns: int) -> tuple[AnyArray, AnyArray]:

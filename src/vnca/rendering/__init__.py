@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vnca.core import AnyArray
-from vnca.core.camera import Camera
+from vnca.core.camera import WHOLE, Camera
 from vnca.core.errors import OptionError, ShapeError
 
 UNSEEN = 5e-4
@@ -59,7 +59,7 @@ def check_view(
 
 
 def rays_in_cells(
-    camera: Camera, rows: int, columns: int, cells_to_world: AnyArray | None
+    camera: Camera, rows: int, columns: int, cells_to_world: AnyArray | None, band: slice = WHOLE
 ) -> tuple[AnyArray, AnyArray]:
     """Rays `point = origin + depth · direction` through the middles of pixels, in cells.
 
@@ -68,11 +68,12 @@ def rays_in_cells(
         rows: Height of the picture, pixels.
         columns: Width of the picture, pixels.
         cells_to_world: 4×4, affine and invertible; the same unless given.
+        band: Through which rows of pixels; all unless given.
 
     Returns:
         Origins and directions `[rays, 3]`, row by row; depths are those of the camera's space.
     """
-    origins, directions = (array.reshape(-1, 3) for array in camera.rays(rows, columns))
+    origins, directions = (array.reshape(-1, 3) for array in camera.rays(rows, columns, band))
     if cells_to_world is None:
         return origins, directions
     to_cells = np.linalg.inv(cells_to_world[:3, :3])

@@ -5,7 +5,7 @@ where the native core is missing.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from typing import NamedTuple
 
@@ -18,6 +18,9 @@ from vnca.engine import native
 from vnca.engine.native.marching import Marcher, Rays
 from vnca.rendering import UNSEEN, averaged, check_view, rays_in_cells, staggered
 from vnca.rendering.light import LightVolume
+
+_RAYS_AT_ONCE = 2**20
+"""A ray takes some hundred bytes: so many are held that threads have enough to share."""
 
 
 class Picture(NamedTuple):
@@ -112,25 +115,40 @@ def render(
     check_view(density.shape, colour.shape, **size, gamma=gamma, step=step)
     if light is not None:
         light.check(density.shape)
-    finer = supersampling * rows, supersampling * columns
-    origins, directions = map(_float32, rays_in_cells(camera, *finer, cells_to_world))
-    offsets = np.zeros(1) if supersampling == 1 else staggered(0.0, supersampling, rows, columns)
-    rays = Rays(
-        origins,
-        directions,
-        _float32(offsets),
-        camera.near,
-        step,
-        extinction=gamma * step,
-        most=-math.log(UNSEEN),
+    marcher, hue, shade = (
+        Marcher(_float32(density)),
+        _float32(colour),
+        light.shade if light else None,
     )
-    pixels, passes = Marcher(_float32(density)).film(
-        _float32(colour), rays, light.shade if light else None
-    )
-    return Picture(
-        averaged(pixels, rows, columns, supersampling),
-        1 - averaged(passes, rows, columns, supersampling),
-    )
+    seen = Picture(np.empty((rows, columns, 3), np.float32), np.empty((rows, columns), np.float32))
+    along = supersampling
+    for band in _bands(rows, columns * along**2):
+        high = band.stop - band.start
+        finer = slice(along * band.start, along * band.stop)
+        origins, directions = map(
+            _float32, rays_in_cells(camera, along * rows, along * columns, cells_to_world, finer)
+        )
+        offsets = np.zeros(1) if along == 1 else staggered(0.0, along, high, columns)
+        rays = Rays(
+            origins,
+            directions,
+            _float32(offsets),
+            camera.near,
+            step,
+            extinction=gamma * step,
+            most=-math.log(UNSEEN),
+        )
+        pixels, passes = marcher.film(hue, rays, shade)
+        seen.colour[band] = averaged(pixels, high, columns, along)
+        seen.opacity[band] = 1 - averaged(passes, high, columns, along)
+    return seen
+
+
+def _bands(rows: int, rays: int) -> Iterator[slice]:
+    """Rows of pixels that together have no more rays than are held at once, `rays` in each."""
+    high = max(1, _RAYS_AT_ONCE // rays)
+    for first in range(0, rows, high):
+        yield slice(first, min(first + high, rows))
 
 
 def _is_native(device: str) -> bool:
