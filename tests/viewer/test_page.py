@@ -4,6 +4,7 @@ import hashlib
 import re
 from pathlib import Path
 
+from vnca.recipe.film import FilmConfig
 from vnca.viewer import PAGE, POLICY, page_file
 
 ROOT = Path(__file__).parents[2]
@@ -39,6 +40,16 @@ def test_it_is_small_and_names_no_host() -> None:
     for name, content in files.items():
         hosts = set(re.findall(rb"https?://[\w.]+", content))
         assert hosts <= {b"http://www.w3.org"}, name  # the name of SVG's elements
+
+
+def test_smoke_is_lit_on_the_page_as_in_films() -> None:
+    source = (ROOT / "web/src/settings.ts").read_text()
+    defaults = dict(re.findall(r"^  (\w+): (-?[\d.]+),$", source, re.MULTILINE))
+    names = ("light", "light_azimuth", "light_elevation", "ambient")
+    of_page = {
+        name: float(defaults[re.sub("_(.)", lambda m: m[1].upper(), name)]) for name in names
+    }
+    assert of_page == {name: getattr(FilmConfig(), name) for name in names}
 
 
 def test_the_page_has_the_policy_that_its_server_sends() -> None:

@@ -120,8 +120,8 @@ def _pictures(painting: Painting, refine: int, scales: object) -> np.ndarray:
     film = FilmConfig(rows=SIZE, columns=SIZE)
     bounds = region_bounds(coarse.box, coarse.index_to_world)
     view = picture(shown, film, bounds=bounds, turned=0.0)
-    over = view.over(behind(film)).numpy()
-    return np.concatenate([view.rgba.numpy().reshape(-1), over.reshape(-1)]).astype(np.float32)
+    over = view.over(behind(film))
+    return np.concatenate([view.rgba.reshape(-1), over.reshape(-1)]).astype(np.float32)
 
 
 def _hostile(site: Path, out: Path) -> None:
