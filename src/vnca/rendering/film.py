@@ -115,11 +115,8 @@ def render(
     check_view(density.shape, colour.shape, **size, gamma=gamma, step=step)
     if light is not None:
         light.check(density.shape)
-    marcher, hue, shade = (
-        Marcher(_float32(density)),
-        _float32(colour),
-        light.shade if light else None,
-    )
+    marcher, hue = Marcher(_float32(density)), _float32(colour)
+    shade = light.shade if light else None
     seen = Picture(np.empty((rows, columns, 3), np.float32), np.empty((rows, columns), np.float32))
     along = supersampling
     for band in _bands(rows, columns * along**2):
