@@ -17,6 +17,7 @@ import json
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from measure import add_models, add_smoke, picture, read_as, trained
@@ -108,7 +109,7 @@ class Scene:
         subprocess.run([python, str(CYCLES), str(request)], check=True, stdout=subprocess.DEVNULL)
         return {key: [np.load(path) for path in paths] for key, paths in files.items()}
 
-    def _view(self, side: Viewpoint, part: float) -> dict[str, object]:
+    def _view(self, side: Viewpoint, part: float) -> dict[str, Any]:
         camera = self.setup.camera(side)
         middle = self.smoke.index_to_world @ [*camera.target, 1]
         return {

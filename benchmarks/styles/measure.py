@@ -14,6 +14,7 @@ import sys
 import time
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import vnca
 from vnca.metrics.measures import Measure
@@ -209,7 +210,7 @@ def add_size(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", type=int, default=224)
 
 
-def read_as(asked: argparse.Namespace) -> dict[str, object]:
+def read_as(asked: argparse.Namespace) -> dict[str, Any]:
     """How smoke is read, as the library has it."""
     names = ("velocity_units", "fps", "time_scale", "velocity_scale")
     return {name: getattr(asked, name) for name in names}
