@@ -104,8 +104,8 @@ def demonstrate(options: Demo) -> None:
 
 def _config(options: Demo) -> SmokeConfig:
     config = replace(preset(SmokeConfig, DEFAULT), seed=options.seed)
-    iterations = 15 if options.quick else 50
-    return replace(config, iterations=iterations, texture=3.0)
+    iterations = 15 if options.quick else 100
+    return replace(config, iterations=iterations, texture=2.0)
 
 
 def _sheet(style: FloatArray, options: RenderRun, watch: Watch) -> FloatArray:
