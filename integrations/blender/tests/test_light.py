@@ -20,8 +20,10 @@ AZIMUTH, ELEVATION, AMBIENT = -55.0, 40.0, 0.15
 SIZE, BLOCK = 64, 4
 SMOKE = HERE.parent.parent.parent / "tests" / "data" / "plume_sphere_0030.vdb"
 PROGRAM = os.environ.get("VNCA_PROGRAM", "")
-ALIKE = {"marble": 0.9, "cafe": 0.9}
-"""How brightness correlates at least. Measured: 0.93 and 0.96."""
+ALIKE = {"marble": (0.9, 0.3), "cafe": (0.9, 0.35)}
+"""How brightness correlates at least, and how far colours are apart at most, over their mean.
+Measured: 0.93 and 0.25, 0.96 and 0.32. The third of the smoke that is darkest in our film is half
+as bright in Cycles, in both."""
 
 
 def ours(path: Path, out: Path) -> np.ndarray:
@@ -110,11 +112,11 @@ def test_cycles_and_our_film_agree_on_lit_smoke(
     theirs = theirs * (theirs * our).sum() / (theirs**2).sum()  # one exposure for all
     brightness = [colours @ (0.2126, 0.7152, 0.0722) for colours in (theirs, our)]
     hue = [colours / colours.sum(1, keepdims=True) for colours in (theirs, our)]
-    assert np.corrcoef(*brightness)[0, 1] > ALIKE[style]
-    # Measured of marble and café: 0.013 and 0.027, 0.25 and 0.32. Light that is scattered many
-    # times takes on the colour each time, so that in Cycles what is dark is darker still.
+    least, most = ALIKE[style]
+    assert np.corrcoef(*brightness)[0, 1] > least
+    assert abs(theirs - our).mean() / our.mean() < most
+    # Measured of marble and café: 0.013 and 0.027.
     assert abs(hue[0] - hue[1]).mean() < 0.035
-    assert abs(theirs - our).mean() / our.mean() < 0.35
     # It is lit from the left, and from above.
     side = np.argwhere(solid)[:, 1] < np.median(np.argwhere(solid)[:, 1])
     assert all(bright[side].mean() > bright[~side].mean() for bright in brightness)

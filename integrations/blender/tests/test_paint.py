@@ -111,10 +111,11 @@ def glowing(painted: bpy.types.Object, number: int) -> np.ndarray:
 
 def interpolated(view: np.ndarray) -> np.ndarray:
     """A view of cells as Cycles shows it: the mean over a cell of what lies between the middles."""
-    blurred = view
+    blurred = np.pad(view, ((1, 1), (1, 1), (0, 0)))
     for axis in (0, 1):
         before, after = (np.roll(blurred, step, axis) for step in (1, -1))
         blurred = (before + 6 * blurred + after) / 8
+    blurred = blurred[1:-1, 1:-1]
     opaque = blurred[..., 3:]
     colour = np.divide(blurred[..., :3], opaque, out=np.zeros_like(view[..., :3]), where=opaque > 0)
     return np.concatenate([colour * view[..., 3:], view[..., 3:]], 2)

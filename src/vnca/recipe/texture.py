@@ -179,12 +179,12 @@ def graft(
     wanted = trainer.rule()
     if source == "none":
         return None
-    chosen = source == AUTO
-    name = nearest_style(linear_to_srgb(style.clip(0, 1))) if chosen else source
+    is_auto = source == AUTO
+    name = nearest_style(linear_to_srgb(style.clip(0, 1))) if is_auto else source
     model = style_or_model(name, "graft")
     misfit = _misfit(model.rule, wanted)
     if misfit is not None:
-        if chosen:
+        if is_auto:
             watch.note("no style of the library has such a rule; training starts from nothing")
             return None
         raise OptionError(f"`graft` {name}: {misfit}")

@@ -20,7 +20,7 @@ from vnca.rendering import UNSEEN, averaged, check_view, rays_in_cells, staggere
 from vnca.rendering.light import LightVolume
 
 _RAYS_AT_ONCE = 2**20
-"""A ray takes some hundred bytes: so many are held that threads have enough to share."""
+"""A ray takes some sixty bytes: so many are held that threads have enough to share."""
 
 
 class Picture(NamedTuple):
