@@ -76,18 +76,18 @@ def test_light_is_interpolated_as_a_field_is() -> None:
     white = np.ones((*SHAPE, 3), np.float32)
     random = np.random.default_rng(1)
     light = LightVolume(density, TOWARDS, gamma=1.0)
-    depth = random.uniform(0, 3, light.shade.depth.shape).astype(np.float32)
-    light.shade = light.shade._replace(depth=depth, octaves=np.array([[1, 1]], np.float32))
+    shadow = random.uniform(0, 1, light.shade.shadow.shape).astype(np.float32)
+    light.shade = light.shade._replace(shadow=shadow)
     points = random.uniform(-0.9, np.array(SHAPE) - 0.1, (500, 3)).astype(np.float32)
     forward = np.tile(np.float32([1, 0, 0]), (500, 1))
     # One sample a ray: the next one would be far beyond the box.
     rays = Rays(points, forward, np.zeros(1, np.float32), 0.0, 1e3, 1.0, 7.0)
     pixels, passes = Marcher(density).film(white, rays, light.shade)
-    reached = march.sample(
-        torch.from_numpy(depth)[..., None],
+    taken = march.sample(
+        torch.from_numpy(shadow)[..., None],
         torch.from_numpy((points + light.shade.first) / light.shade.times).float(),
     )[:, 0]
-    shone = light.shade.base + light.shade.gain * np.exp(-reached.numpy())
+    shone = light.shade.full - taken.numpy()
     np.testing.assert_allclose(pixels, ((1 - passes) * shone)[:, None].repeat(3, 1), atol=2e-7)
     np.testing.assert_allclose(passes, 1 - 1e-4 * _inside(points), atol=1e-7)
 
@@ -201,10 +201,9 @@ def test_what_does_not_cover_the_same_cells_is_refused(draw: Callable[..., film.
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("depth", np.zeros((3, 4), np.float32)),
-        ("depth", np.zeros((0, 4, 4), np.float32)),
-        ("depth", np.zeros((3, 4, 4))),
-        ("octaves", np.zeros((3, 3), np.float32)),
+        ("shadow", np.zeros((3, 4), np.float32)),
+        ("shadow", np.zeros((0, 4, 4), np.float32)),
+        ("shadow", np.zeros((3, 4, 4))),
         ("first", (0.0, 0.0)),
     ],
 )

@@ -27,11 +27,19 @@ as bright in Cycles, in both."""
 
 
 def ours(path: Path, out: Path) -> np.ndarray:
-    """Our view: from the front, without perspective, linear RGBA with premultiplied colours."""
+    """Our view: from the front, without perspective, linear RGBA with premultiplied colours.
+
+    Our light makes flat faces as bright from everywhere as from before them; in a sun that gives
+    smoke as much as light from everywhere does, they are not.
+    """
+    from vnca.rendering.light import EVEN, FACING
+
+    even, facing = AMBIENT * EVEN, (1 - AMBIENT) * FACING
+    ambient = even / (even + facing)
     words = [
         *(PROGRAM, "render", str(path), "--out", str(out), "--transparent"),
         *("--rows", str(SIZE), "--columns", str(SIZE), "--field-of-view", "0"),
-        *("--elevation", "0", "--light", "1", "--ambient", str(AMBIENT)),
+        *("--elevation", "0", "--light", "1", "--ambient", str(ambient)),
         *("--light-azimuth", str(AZIMUTH), "--light-elevation", str(ELEVATION)),
     ]
     done = subprocess.run(words, capture_output=True, text=True)

@@ -68,7 +68,7 @@ class FilmConfig(Shot):
     supersampling: int | None = None
     """Rays along the rows and the columns of a pixel, 1 to 4; unless given, as many as there are
     cells across one: single rays miss some cells, and others a frame later."""
-    light: float = 1.5
+    light: float = 2.0
     """Strength of a light that the smoke is seen by and throws shadows in. 0: none, the smoke glows
     in its own colours before an even background."""
     light_azimuth: float = -55.0

@@ -1,12 +1,13 @@
-"""A key light that shines through smoke, and the shadows that the smoke throws on itself.
+"""A key light and a sky that shine through smoke, and the shadows that it throws on itself.
 
-How much smoke lies between a cell and the light is found once for all cells, in numpy, so that a
-view looks it up at its samples: README.md. Nothing here is differentiated.
+How much light reaches a cell is found once for all cells, in numpy, so that a view looks it up at
+its samples: README.md. Nothing here is differentiated.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import floor, isfinite
+from itertools import product
+from math import floor, isfinite, log
 
 import numpy as np
 
@@ -18,16 +19,28 @@ from vnca.engine.native.marching import Shade
 FINEST = 96
 """Cells of a light volume along the longest side of what is lit: shadows are soft."""
 
-OCTAVES = ((0.5, 1.0), (0.3, 1 / 4), (0.2, 1 / 16))
-"""Weights, which add up to one, and parts of the extinction that light scattered ever more often
-meets.
+OCTAVES = ((0.8, 1.0), (0.2, 1 / 4))
+"""Weights, which add up to one, and parts of the extinction that light meets: when it is scattered
+once, and more often. Chosen by what Cycles makes of grey smoke (README.md).
 
 Reference: Wrenninge, Kulla & Lundqvist 2013.
 """
 
-# Of what faces a light that would be 1 (README.md).
-_FACING = sum(weight / (1 + part) for weight, part in OCTAVES)
-_OCTAVES = np.array([(weight / _FACING, part) for weight, part in OCTAVES], np.float32)
+FACING = sum(weight / (1 + part) for weight, part in OCTAVES)
+"""How bright opaque smoke is that faces a light of 1 (README.md)."""
+EVEN = sum(weight / 2 * (1 - part * log(1 + 1 / part)) for weight, part in OCTAVES)
+"""How bright a flat face of opaque smoke is in light of 1 from everywhere (README.md)."""
+
+SKY = tuple(
+    (1 / 15 if abs(way).sum() == 1 else 3 / 40, way / np.linalg.norm(way))
+    for way in np.array(list(product((-1, 0, 1), repeat=3)))
+    if abs(way).sum() in (1, 3)
+)
+"""Weights, which add up to one, and unit vectors of the world that light from everywhere is summed
+along: the sides and the corners of a cube.
+
+Reference: Lebedev 1976.
+"""
 
 
 @dataclass(frozen=True)
@@ -39,13 +52,13 @@ class Light:
         elevation: Degrees above the horizon.
         strength: 0 lets the smoke glow by itself; 1 lights it and lets nothing glow, between them
             it does some of both; above 1 the light is so many times as bright.
-        ambient: Part of the light that comes from everywhere and reaches every cell, 0 to 1.
+        ambient: Part of the light that comes from everywhere, 0 to 1.
     """
 
     azimuth: float
     elevation: float
     strength: float = 1.0
-    ambient: float = 0.25
+    ambient: float = 0.2
 
     def __post_init__(self) -> None:
         if not (isfinite(self.azimuth) and isfinite(self.elevation)):
@@ -61,22 +74,17 @@ class Light:
         return -view_axes(self.azimuth, self.elevation)[2]
 
     @property
-    def base(self) -> float:
-        """What a colour is multiplied by, however much smoke is in the way."""
-        return max(1 - self.strength, 0.0) + self.strength * self.ambient
-
-    @property
-    def gain(self) -> float:
-        """How much more it is in front of all smoke."""
-        return self.strength * (1 - self.ambient)
+    def full(self) -> float:
+        """What a colour is multiplied by where no smoke is in the way."""
+        return max(1 - self.strength, 0.0) + self.strength
 
 
 class LightVolume:
-    """The optical depth of the smoke between each place and the light.
+    """How much light reaches each place in the smoke.
 
     Attributes:
-        shade: What it does to colours, as optical depths at the centres of cells that are as coarse
-            as asked for.
+        shade: What it does to colours, as shadow at the centres of cells that are as coarse as
+            asked for.
         shape: Cells of the density.
     """
 
@@ -112,15 +120,26 @@ class LightVolume:
         edges = np.linalg.norm(matrix, axis=0)
         times = np.maximum(np.rint(spacing / edges), 1).astype(int)
         before = times + np.asarray(origin) % times
-        coarse = _averaged(density, times.tolist(), before.tolist())
-        towards = np.linalg.inv(matrix * times) @ light.towards
+        extinction = _averaged(density, times.tolist(), before.tolist()) * np.float32(gamma)
+        in_cells = np.linalg.inv(matrix * times)
+        shadow = np.zeros(extinction.shape, np.float32)
+        for part, others, ways in (
+            (1 - light.ambient, FACING, ((1.0, light.towards),)),
+            (light.ambient, EVEN, SKY),
+        ):
+            if part * light.strength > 0:
+                reached = sum(
+                    np.float32(weight) * _passed(_swept(extinction, in_cells @ way))
+                    for weight, way in ways
+                )
+                shadow += np.float32(part * light.strength) * np.maximum(
+                    1 - reached / np.float32(others), 0
+                )
         self.shade = Shade(
-            _swept(coarse * np.float32(gamma), towards),
+            shadow,
             tuple((before - (times - 1) / 2).tolist()),
             tuple(times.astype(float).tolist()),
-            _OCTAVES,
-            light.base,
-            light.gain,
+            light.full,
         )
 
     def check(self, shape: Sequence[int]) -> None:
@@ -150,6 +169,14 @@ def _averaged(density: FloatArray, times: Sequence[int], before: Sequence[int]) 
             total += padded[layer::block]
         means = np.moveaxis(total / np.float32(block), 0, axis)
     return means
+
+
+def _passed(depth: FloatArray) -> FloatArray:
+    """How much of a light of 1 gets through smoke, scattered once or more often."""
+    passed = np.zeros_like(depth)
+    for weight, part in OCTAVES:
+        passed += np.float32(weight) * np.exp(np.float32(-part) * depth)
+    return passed
 
 
 def _swept(extinction: FloatArray, towards: AnyArray) -> FloatArray:

@@ -220,16 +220,12 @@ def lighting(light: LightVolume, like: Tensor) -> Callable[[Tensor], Tensor]:
         light: What lights the smoke.
         like: Of which type, and where, points are.
     """
-    depth, first, times, octaves, base, gain = light.shade
-    field, first, times = (like.new_tensor(part) for part in (depth[..., None], first, times))
+    shadow, first, times, full = light.shade
+    field, first, times = (like.new_tensor(part) for part in (shadow[..., None], first, times))
 
     @torch.no_grad()
     def at(points: Tensor) -> Tensor:
-        reached = sample(field, (points + first) / times)[:, 0]
-        direct = torch.zeros_like(reached)
-        for weight, part in octaves.tolist():
-            direct += weight * torch.exp(-part * reached)
-        return base + gain * direct.clamp_max(1)
+        return full - sample(field, (points + first) / times)[:, 0]
 
     return at
 

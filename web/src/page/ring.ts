@@ -2,7 +2,7 @@
 
 import { slope } from "../picture/camera";
 import { element } from "./dom";
-import { spacing } from "../picture/picture";
+import { spacing } from "../picture/volume";
 import type { Viewer } from "../viewer";
 
 export function makeRing(viewer: Viewer): HTMLElement {

@@ -8,7 +8,8 @@ import { type FrameBuffers, smokeShader } from "../smoke/frame";
 import { type Gpu, run } from "../gpu/gpu";
 import type { Layer } from "../automaton/layer";
 import { plus, scaled, type Vector } from "../matrix";
-import { alongCells, BRUSHED, type Picture } from "./picture";
+import { BRUSHED, type Picture } from "./picture";
+import { alongCells } from "./volume";
 import { Layout, Rows } from "../gpu/rows";
 import type { Smoke } from "../smoke/smoke";
 

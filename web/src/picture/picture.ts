@@ -1,37 +1,20 @@
 // From what layers have painted to a picture: the volume that is drawn, the light in it, the rays.
 
-import lightCode from "../shaders/light.wgsl";
 import marchCode from "../shaders/march.wgsl";
 import volumeCode from "../shaders/volume.wgsl";
 import { type Camera, pinhole, slope, viewAxes } from "./camera";
-import { type Gpu, mebibytes, run } from "../gpu/gpu";
+import { type Gpu, run } from "../gpu/gpu";
 import { type FrameBuffers, smokeShader } from "../smoke/frame";
 import type { Layer } from "../automaton/layer";
-import { affineInverse, applied, rotated, scaled, type Matrix4, type Vector } from "../matrix";
-import { Problem } from "../problem";
+import { type Light, LightVolume, full } from "./light";
+import { affineInverse, applied, scaled, type Vector } from "../matrix";
 import { Layout, type Rows } from "../gpu/rows";
 import { PLACES, sitesShader } from "../automaton/sites";
 import type { Smoke } from "../smoke/smoke";
+import { alongCells, drawnSize, fours, volumeTexture } from "./volume";
 
-/** Blocks of the light along the longest side: shadows are soft. */
-const FINEST = 96;
-const OCTAVES = [
-  [0.5, 1],
-  [0.3, 1 / 4],
-  [0.2, 1 / 16],
-];
-const FACING = OCTAVES.reduce((sum, [weight, part]) => sum + weight / (1 + part), 0);
-const MOST_TEXELS = 2 ** 27;
 /** Linear, premultiplied, with opacity. */
 export const PICTURE: GPUTextureFormat = "rgba16float";
-
-export interface Light {
-  /** 0: the smoke glows by itself. */
-  strength: number;
-  azimuth: number;
-  elevation: number;
-  ambient: number;
-}
 
 export interface Look {
   strength: number;
@@ -73,10 +56,7 @@ export class Picture {
   private textures: GPUTexture[] = [];
   private buffers: FrameBuffers | null = null;
   private drawn: GPUTexture | null = null;
-  private reached: GPUTexture | null = null;
-  private blocks: { first: Vector; size: Vector; times: number; slots: GPUBuffer } | null = null;
-  private thickness: GPUBuffer | null = null;
-  private depth: GPUBuffer | null = null;
+  private shadows: LightVolume | null = null;
   private readonly looks: GPUBuffer[];
   private readonly camera: GPUBuffer;
   private readonly sampler: GPUSampler;
@@ -87,9 +67,9 @@ export class Picture {
     private readonly smoke: Smoke,
   ) {
     this.looks = [0, 1].map(() => gpu.uniform(32));
-    this.camera = gpu.uniform(128);
+    this.camera = gpu.uniform(112);
     this.sampler = gpu.device.createSampler({ magFilter: "linear", minFilter: "linear" });
-    this.nothing = this.texture([1, 1, 1]);
+    this.nothing = volumeTexture(gpu, [1, 1, 1]);
   }
 
   static async create(gpu: Gpu, smoke: Smoke): Promise<Picture> {
@@ -97,8 +77,7 @@ export class Picture {
     await Promise.all([
       gpu.prepare([
         [volumeShader(WHOLE, WHOLE, WHOLE, WHOLE), "volume"],
-        [lightCode, "gather"],
-        [lightCode, "sweep"],
+        ...LightVolume.prepared(),
       ]),
       gpu.prepareRender(marchShader(WHOLE), "march", PICTURE),
     ]);
@@ -111,36 +90,8 @@ export class Picture {
     this.release();
     this.size = drawnSize(this.gpu, this.smoke, parts);
     this.parts = parts;
-    this.textures = [0, 1].map(() => this.texture(this.size));
-    this.makeBlocks();
-  }
-
-  private makeBlocks(): void {
-    const { gpu, smoke, parts } = this;
-    // In lengths of a cell of what is drawn, the box of the world is as large as the light's.
-    const [low, high] = worldBox(smoke, parts);
-    const spacing = Math.max(...low.map((value, axis) => high[axis] - value)) / FINEST;
-    const times = Math.max(Math.round(spacing), 1);
-    const first = smoke.lower.map((cell) => Math.floor((cell * parts) / times) - 1);
-    const last = smoke.upper.map((cell) => Math.floor((cell * parts - 1) / times) + 1);
-    const size = first.map((block, axis) => last[axis] - block + 1);
-    const count = size.reduce((product, side) => product * side, 1);
-    this.reached = this.texture(size);
-    this.thickness = gpu.buffer(4 * count);
-    this.depth = gpu.buffer(4 * count);
-    this.blocks = { first, size, times, slots: gpu.uniform(256 * Math.max(...size)) };
-  }
-
-  private texture(size: Vector): GPUTexture {
-    return this.gpu.device.createTexture({
-      size,
-      dimension: "3d",
-      format: "rgba16float",
-      usage:
-        GPUTextureUsage.TEXTURE_BINDING |
-        GPUTextureUsage.STORAGE_BINDING |
-        GPUTextureUsage.COPY_SRC,
-    });
+    this.textures = [0, 1].map(() => volumeTexture(this.gpu, this.size));
+    this.shadows = new LightVolume(this.gpu, this.smoke, parts);
   }
 
   /** What is there, of one rule or of a second mixed over it, and how light reaches it. */
@@ -158,7 +109,7 @@ export class Picture {
       under = this.drawLayer(buffers, layer, at, brushed, under);
     });
     this.drawn = under;
-    if (look.light.strength > 0) this.shine(look);
+    if (look.light.strength > 0) this.shadows!.cast(this.drawn, look.light, look.gamma);
   }
 
   private drawLayer(
@@ -190,43 +141,6 @@ export class Picture {
     return drawn;
   }
 
-  private shine({ light, gamma }: Look): void {
-    const { gpu, parts } = this;
-    const [gather, sweep] = ["gather", "sweep"].map((entry) => gpu.compute(lightCode, entry));
-    const { first, size, times, slots } = this.blocks!;
-    const [, , forward] = viewAxes(light.azimuth, light.elevation);
-    const towards = scaled(alongCells(this.smoke, scaled(forward, -1)), 1 / times);
-    const main = towards.map(Math.abs).reduce((best, value, axis, all) => (value > all[best] ? axis : best), 0);
-    const others = [0, 1, 2].filter((axis) => axis !== main);
-    const shift = others.map((axis) => towards[axis] / Math.abs(towards[main]));
-    const half = ((0.5 / Math.abs(towards[main])) * gamma) / parts;
-    const origin = this.smoke.lower.map((cell) => cell * parts - 1);
-    const numbers = new ArrayBuffer(256 * size[main]);
-    for (let layer = 0; layer < size[main]; layer++) {
-      const ints = new Int32Array(numbers, 256 * layer, 16);
-      const floats = new Float32Array(numbers, 256 * layer, 16);
-      ints.set([...first, main, ...size, times, ...origin, towards[main] > 0 ? 1 : 0]);
-      floats.set([...shift, half], 12);
-      ints[15] = layer;
-    }
-    gpu.write(slots, new Uint8Array(numbers));
-    const slot = (layer: number): GPUBufferBinding => ({ buffer: slots, offset: 256 * layer, size: 64 });
-    gpu.submit((encoder) => {
-      const views = { 1: this.drawn!.createView(), 2: this.thickness! };
-      run(encoder, gather, [gpu.bound(gather, 0, { 0: slot(0), ...views })], fours(size));
-      const [wide, high] = others.map((axis) => Math.ceil(size[axis] / 8));
-      for (let layer = 0; layer < size[main]; layer++) {
-        const group = gpu.bound(sweep, 0, {
-          0: slot(layer),
-          2: this.thickness!,
-          3: this.depth!,
-          4: this.reached!.createView(),
-        });
-        run(encoder, sweep, [group], [wide, high, 1]);
-      }
-    });
-  }
-
   /** The picture of a camera, into a texture, from `left` to `right` of it, 0 … 1. */
   take(
     encoder: GPUCommandEncoder,
@@ -243,21 +157,15 @@ export class Picture {
     const [across, up, forward] = viewAxes(camera.azimuth, camera.elevation);
     const cells = (vector: Vector): Vector => alongCells(this.smoke, vector);
     const { light } = look;
-    const glow = Math.max(1 - light.strength, 0);
-    const blocks = this.blocks!;
-    // Where the first block has its middle, in cells of what is drawn, of which the first is -1.
-    const middle = blocks.first.map(
-      (block, axis) => (block + 0.5) * blocks.times - 0.5 - this.smoke.lower[axis] * parts + 1,
-    );
+    const shadows = this.shadows!;
     const numbers = new Float32Array([
       ...this.place(pinhole(camera)), parts,
       ...cells(forward), stride,
       ...cells(scaled(across, extent)), aspect,
       ...cells(scaled(up, extent)), (look.gamma / parts) * stride,
       ...this.size, 0,
-      ...middle, blocks.times,
-      glow, light.strength, light.ambient, light.strength > 0 ? 1 : 0,
-      ...OCTAVES.map(([weight]) => weight / FACING), 0,
+      ...shadows.middle, shadows.times,
+      full(light), light.strength > 0 ? 1 : 0, 0, 0,
     ]);
     gpu.write(this.camera, numbers);
     const buffers = this.buffers!;
@@ -276,7 +184,7 @@ export class Picture {
     const group = gpu.bound(march, 0, {
       0: this.camera,
       1: this.drawn!.createView(),
-      2: this.reached!.createView(),
+      2: shadows.shadow.createView(),
       3: this.sampler,
     });
     pass.setBindGroup(0, group);
@@ -313,7 +221,7 @@ export class Picture {
 
   private release(): void {
     for (const texture of this.textures) texture.destroy();
-    for (const old of [this.reached, this.thickness, this.depth, this.blocks?.slots]) old?.destroy();
+    this.shadows?.destroy();
   }
 
   destroy(): void {
@@ -321,50 +229,3 @@ export class Picture {
     for (const old of [this.camera, this.nothing, ...this.looks]) old.destroy();
   }
 }
-
-/** Cells of what is drawn along each axis; more than a page can draw are refused. */
-export function drawnSize(gpu: Gpu, { lower, upper }: Smoke, parts: number): Vector {
-  const size = lower.map((low, axis) => (upper[axis] - low) * parts + 2);
-  const most = gpu.device.limits.maxTextureDimension3D;
-  const texels = size.reduce((product, side) => product * side, 1);
-  if (Math.max(...size) > most || texels > MOST_TEXELS) {
-    throw new Problem(
-      `A volume of ${size.join(" × ")} (${mebibytes(8 * texels)}) is more than this page draws: ` +
-        "choose a smaller sequence or less detail.",
-    );
-  }
-  return size;
-}
-
-/** A unit vector of the world along the axes of the cells, which are cubes. */
-export function alongCells(smoke: Smoke, vector: Vector): Vector {
-  return scaled(rotated(affineInverse(smoke.toWorld), vector), spacing(smoke));
-}
-
-/** The length of a cell's edge in the world. */
-export function spacing(smoke: Smoke): number {
-  return Math.hypot(...[0, 1, 2].map((row) => smoke.toWorld[row][0]));
-}
-
-/** The least and greatest corner of the world's box around the smoke, in parts of a cell. */
-export function worldBox(smoke: Smoke, parts: number): [Vector, Vector] {
-  const length = spacing(smoke) / parts;
-  const [low, high] = worldCorners(smoke, smoke.toWorld);
-  return [scaled(low, 1 / length), scaled(high, 1 / length)];
-}
-
-/** Likewise in the world's own lengths. */
-export function worldCorners(smoke: Smoke, toWorld: Matrix4): [Vector, Vector] {
-  const corners = Array.from({ length: 8 }, (_, corner) => {
-    const at = [0, 1, 2].map((axis) => ((corner >> axis) & 1 ? smoke.upper : smoke.lower)[axis] - 0.5);
-    return applied(toWorld, at);
-  });
-  const pick = (choose: (...values: number[]) => number): Vector =>
-    [0, 1, 2].map((axis) => choose(...corners.map((corner) => corner[axis])));
-  return [pick(Math.min), pick(Math.max)];
-}
-
-function fours(size: Vector): [number, number, number] {
-  return size.map((side) => Math.ceil(side / 4)) as [number, number, number];
-}
-

@@ -8,15 +8,14 @@ struct Camera {
   up: vec4f,         // and for one up; w: γ times the step.
   size: vec4f,       // Of what is drawn, in cells; w: how much of the picture, from the left.
   blocks: vec4f,     // The first block of the light, in cells; w: cells along an edge of a block.
-  light: vec4f,      // glow, strength, ambient, and 1 where there is a light.
-  octaves: vec4f,    // Their weights over what faces the light.
+  light: vec4f,      // What a colour is multiplied by without shadow; 1 where there is a light.
 }
 
 // Where a file has no brick there is no smoke within a cell (`viewer/smoke_file.py`): rays leap.
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var drawn: texture_3d<f32>;
-@group(0) @binding(2) var reached: texture_3d<f32>;
+@group(0) @binding(2) var shadow: texture_3d<f32>;
 @group(0) @binding(3) var between: sampler;
 
 struct Corner {
@@ -31,12 +30,9 @@ fn corner(@builtin(vertex_index) index: u32) -> Corner {
 }
 
 fn lit(cell: vec3f) -> f32 {
-  let size = vec3f(textureDimensions(reached));
+  let size = vec3f(textureDimensions(shadow));
   let at = (cell - camera.blocks.xyz) / camera.blocks.w;
-  let depth = textureSampleLevel(reached, between, (at + 0.5) / size, 0.0).x;
-  let direct = dot(camera.octaves.xyz, exp(-depth * vec3f(1.0, 0.25, 0.0625)));
-  return camera.light.x
-    + camera.light.y * (camera.light.z + (1.0 - camera.light.z) * min(direct, 1.0));
+  return camera.light.x - textureSampleLevel(shadow, between, (at + 0.5) / size, 0.0).x;
 }
 
 // The brick of the cell of the box that is nearest to a place, in bricks: smoke fades over the cell
@@ -90,7 +86,7 @@ fn march(@location(0) place: vec2f) -> @location(0) vec4f {
     }
     let weight = (1.0 - seen) * (1.0 - exp(-camera.up.w * value.w));
     var hue = value.xyz / value.w;
-    if (camera.light.w > 0.0) {
+    if (camera.light.y > 0.0) {
       hue *= lit(cell);
     }
     colour += weight * hue;

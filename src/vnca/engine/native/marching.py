@@ -55,23 +55,20 @@ class Rays(NamedTuple):
 
 
 class Shade(NamedTuple):
-    """A light behind smoke: colours are multiplied by base + gain · min(1, Σ weight exp(−part τ)).
+    """A light in smoke: colours are multiplied by what is full but for the shadow.
 
     Attributes:
-        depth: `[x, y, z]`, τ, at the centres of cells of its own; none outside of them.
+        shadow: `[x, y, z]`, what is taken away at the centres of cells of its own, and interpolated
+            between them; nothing outside of them.
         first: A point of the density is (point + first) / times in these cells.
         times: How much larger they are.
-        octaves: `[n, 2]`, weights and parts.
-        base: Share that is always there.
-        gain: What is added where nothing is in the way.
+        full: What is there without shadow.
     """
 
-    depth: FloatArray
+    shadow: FloatArray
     first: tuple[float, float, float]
     times: tuple[float, float, float]
-    octaves: FloatArray
-    base: float
-    gain: float
+    full: float
 
 
 @dataclass(frozen=True, eq=False)

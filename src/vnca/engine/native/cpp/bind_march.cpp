@@ -52,16 +52,15 @@ Rays checked_rays(const Density& smoke, const Input& origins, const Input& direc
     return along;
 }
 
-// Depths, where they lie, octaves, base and gain.
-using Lit = std::tuple<Input, Point, Point, Input, float, float>;
+// Shadow, where it lies, and what there is without it.
+using Lit = std::tuple<Input, Point, Point, float>;
 
 Light checked_light(const Lit& lit) {
-    const auto& [depth, first, times, octaves, base, gain] = lit;
-    Light light = {data_of<float>(depth, "depths of the light", {ANY, ANY, ANY}), {}, {}, {},
-                   data_of<float>(octaves, "octaves", {ANY, 2}), length(octaves, 0), base, gain};
+    const auto& [shadow, first, times, full] = lit;
+    Light light = {data_of<float>(shadow, "shadow", {ANY, ANY, ANY}), {}, {}, {}, full};
     for (int axis = 0; axis < 3; ++axis) {
-        light.shape[axis] = length(depth, axis);
-        in_range("cells of light along an axis", light.shape[axis], 1, INT32_MAX);
+        light.shape[axis] = length(shadow, axis);
+        in_range("cells of shadow along an axis", light.shape[axis], 1, INT32_MAX);
         light.first[axis] = first[axis];
         light.times[axis] = times[axis];
     }
@@ -141,7 +140,7 @@ void bind_march(nb::module_& m) {
         float* const pixels = data_of<float>(to_colour, "colour of rays", {along.count, 3});
         float* const through = data_of<float>(passes, "what passes", {along.count});
         std::vector<Extent> inputs = {density, near, colour, origins, directions, offsets};
-        if (lit) inputs.insert(inputs.end(), {std::get<0>(*lit), std::get<3>(*lit)});
+        if (lit) inputs.emplace_back(std::get<0>(*lit));
         check_apart({to_colour, passes}, inputs);
         nb::gil_scoped_release released;
         film(smoke, hue, light ? &*light : nullptr, along, pixels, through, threads);

@@ -10,37 +10,26 @@
 
 namespace vnca {
 
-// How much smoke lies between places and a light, [shape] optical depths, z fastest; and what colours are
-// multiplied by behind so much: base + gain · min(1, Σ weight · exp(−part · depth)).
+// What colours are multiplied by: `full`, but for a shadow, [shape], z fastest.
 struct Light {
-    const float* depth;
+    const float* shadow;
     std::int64_t shape[3];
     float first[3], times[3];  // a point of the density is (point + first) / times here
-    const float* octaves;      // [count, 2], weights and parts
-    std::int64_t count;
-    float base, gain;
+    float full;
 
     float at(const float point[3]) const {
         float place[3];
         std::int64_t cell[3];
         for (int axis = 0; axis < 3; ++axis) {
             place[axis] = (point[axis] + first[axis]) / times[axis];
-            // Outside it is dark nowhere; and a cell has a number.
-            if (!(place[axis] > -1 && place[axis] < float(shape[axis]))) return through(0);
+            // Outside there is no shadow; and a cell has a number.
+            if (!(place[axis] > -1 && place[axis] < float(shape[axis]))) return full;
             cell[axis] = below(place[axis]);
         }
         const Corners corners(shape, cell, place);
-        float sum = 0;
-        for (int k = 0; k < 8; ++k) sum += corners.weight[k] * depth[corners.cell[k]];
-        return through(sum);
-    }
-
-private:
-    float through(float reached) const {
-        float direct = 0;
-        for (std::int64_t i = 0; i < count; ++i)
-            direct += octaves[2 * i] * std::exp(-octaves[2 * i + 1] * reached);
-        return base + gain * std::min(direct, 1.0f);
+        float taken = 0;
+        for (int k = 0; k < 8; ++k) taken += corners.weight[k] * shadow[corners.cell[k]];
+        return full - taken;
     }
 };
 
