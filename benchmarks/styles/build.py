@@ -26,6 +26,13 @@ Two went on from there. The harvest, twice, the second time with `-s 3`:
 The stained glass with `--view.thinnest 0.03` besides; it is `stained_glass=LONGER+RUN`, as the
 longer training alone has too much lead after some seconds of a film.
 
+Café, church and harvest went on with what is seen compared, too:
+
+    vnca train FRAME PICTURE -o RUN --init STYLE --more-frames BILLOWY JET SPHERE
+        --iterations 300 --consistency 0.5 --pool.reseed-every 40 -s 3
+
+The others have `--consistency 0`: lines become broad by it.
+
 The woodcut has `--appearance.style-scale 2 --appearance.style 1` in both: by distributions alone
 its lines become blots.
 

@@ -39,8 +39,8 @@ class Scene(NamedTuple):
 
 SCENES = {
     "plume": Scene(cells=64, frames=40, refine=2, light=0.0),
-    "ring": Scene(cells=64, frames=40, refine=2, light=1.2),
-    "jets": Scene(cells=128, frames=40, refine=1, light=1.2),
+    "ring": Scene(cells=64, frames=40, refine=2, light=2.0),
+    "jets": Scene(cells=128, frames=40, refine=1, light=2.0),
 }
 
 

@@ -20,6 +20,7 @@ from vnca.training.config import PoolConfig, SmokeConfig, ViewConfig
         (SmokeConfig, "shortest_rollout", 0),
         (SmokeConfig, "overflow", math.nan),
         (SmokeConfig, "steadiness", -1.0),
+        (SmokeConfig, "consistency", -1.0),
         (SmokeConfig, "mass", math.inf),
         (SmokeConfig, "texture", -1.0),
         (SmokeConfig, "texture", 1001.0),

@@ -17,7 +17,7 @@ from vnca.training.config import PoolConfig, SliceConfig, SmokeConfig, ViewConfi
 from vnca.training.loop import Trainer
 from vnca.training.scenes.smoke import SmokeScene
 from vnca.training.scenes.texture import BlockScene
-from vnca.training.terms import GROWN, Iteration, MassTerm, SteadinessTerm
+from vnca.training.terms import GROWN, ConsistencyTerm, Iteration, Keeping, MassTerm, SteadinessTerm
 from vnca.training.trainers import smoke_trainer
 
 SHAPE = RuleConfig(channels=6, hidden=16, transport=True)
@@ -83,6 +83,44 @@ def test_a_state_that_grows_is_left_to_grow(scene: SmokeScene) -> None:
     assert SteadinessTerm(1)(iteration(scene, before, 2 * before, GROWN - 1)) == {}
 
 
+def looked_at(scene: SmokeScene, before: torch.Tensor, after: torch.Tensor, age: int) -> Iteration:
+    viewpoint = scene.viewpoint(np.random.default_rng(0))
+    background = torch.full((3,), 0.2)
+    pictures, opacity = scene.pictures(after, viewpoint, background)
+    return replace(
+        iteration(scene, before, after, age),
+        viewpoint=viewpoint,
+        pictures=pictures,
+        opacity=opacity,
+        background=background,
+    )
+
+
+def test_what_is_seen_to_stay_costs_nothing_whatever_is_hidden(scene: SmokeScene) -> None:
+    before = grown(scene)
+    hidden = before.clone()
+    hidden[:-1, DENSITY_CHANGE + 1 :] += 0.1
+    term = ConsistencyTerm(0.5)
+    assert float(term(looked_at(scene, before, hidden, GROWN))["consistency"]) == 0
+    assert float(SteadinessTerm(0.5)(iteration(scene, before, hidden, GROWN))["steadiness"]) > 0.01
+
+
+def test_what_is_seen_all_new_costs_twice_the_weight(scene: SmokeScene) -> None:
+    before = grown(scene)
+    before[:, DENSITY_CHANGE] = 0
+    other = torch.cat([before[:-1].flip(0), before[-1:]]).requires_grad_()
+    cost = ConsistencyTerm(0.5)(looked_at(scene, before, other, GROWN))["consistency"]
+    assert cost.item() == pytest.approx(2 * 0.5 * 3.0, rel=0.3)
+    cost.backward()
+    assert other.grad is not None
+    assert other.grad[:, :DENSITY_CHANGE].any()
+
+
+def test_views_of_a_state_that_grows_may_change(scene: SmokeScene) -> None:
+    before = grown(scene)
+    assert ConsistencyTerm(1)(looked_at(scene, before, 2 * before, GROWN - 1)) == {}
+
+
 @pytest.mark.parametrize("decoded", [False, True])
 def test_mass_is_that_of_the_density_however_thin_where_it_changes(
     tiny_smoke: Volume, decoded: bool
@@ -139,8 +177,9 @@ def test_a_cell_that_nothing_came_to_is_left_to_grow(scene: SmokeScene) -> None:
     after = grown(scene)
     kept = after.clone()
     kept[: len(kept) // 2] = 0
-    seen = replace(iteration(scene, kept, after, GROWN), kept=kept)
+    seen = looked_at(scene, kept, after, GROWN)
     assert float(SteadinessTerm(1)(seen)["steadiness"]) == 0
+    assert float(ConsistencyTerm(1)(seen)["consistency"]) == 0
 
 
 def test_a_block_is_carried_as_a_whole() -> None:
@@ -152,16 +191,16 @@ def test_a_block_is_carried_as_a_whole() -> None:
     np.testing.assert_allclose(moved, block.roll((1, -2), (0, 2)), atol=1e-6)
 
 
-def test_a_rule_learns_to_keep_its_pattern(trainer: Callable[..., Trainer]) -> None:
+@pytest.mark.parametrize("term", [SteadinessTerm(1), ConsistencyTerm(1)])
+def test_a_rule_learns_to_keep_its_pattern(trainer: Callable[..., Trainer], term: Keeping) -> None:
     def changes(**options: Any) -> float:
         training = trainer(iterations=40, shortest_rollout=4, longest_rollout=4, **options)
-        term, seen = SteadinessTerm(1), []
+        seen = []
 
         class Watched(SteadinessTerm):
             def __call__(self, shown: Iteration) -> dict[str, torch.Tensor]:
-                balance = float(shown.sums["appearance"].detach())
-                if told := term(shown):
-                    seen.append(float(told["steadiness"].detach()) / balance)
+                if shown.age >= GROWN:
+                    seen.append(float(term.change(shown).detach()))
                 return {}
 
         watched = Watched(1)
@@ -170,11 +209,11 @@ def test_a_rule_learns_to_keep_its_pattern(trainer: Callable[..., Trainer]) -> N
         list(training.run())
         return float(np.median(seen[-8:]))
 
-    assert changes(steadiness=16.0) < 0.7 * changes()
+    assert changes(**{term.name: 16.0}) < 0.7 * changes()
 
 
 def test_all_of_it_goes_on_from_a_snapshot(trainer: Callable[..., Trainer]) -> None:
-    options = {"iterations": 8, "steadiness": 2.0, "mass": 10.0}
+    options = {"iterations": 8, "steadiness": 2.0, "consistency": 1.0, "mass": 10.0}
     whole, first, second = (trainer(**options) for _ in range(3))
     list(whole.run())
     for _ in range(5):

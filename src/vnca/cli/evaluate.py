@@ -123,6 +123,7 @@ def run_ablate(arguments: Sequence[str]) -> None:
         config,
         texture=0.0,
         steadiness=0.0,
+        consistency=0.0,
         rule=dataclasses.replace(config.rule, transport=False),
         motion=dataclasses.replace(config.motion, weight=config.motion.weight or 1.0),
     )

@@ -83,6 +83,9 @@ class TrainingConfig(ABC):
     steadiness: float = 0.0
     """Weight of how much a rollout changes a grown state, relative to the median appearance loss:
     the rule learns to keep its pattern. 0 leaves it out."""
+    consistency: float = 0.0
+    """Weight of how much a rollout changes what is seen of a grown state, likewise: strokes flow
+    with the smoke and do not flicker. 0 leaves it out."""
     features: str = "efficientnet"
     """Network that compares pictures: efficientnet, edges, imagenet, vgg16 (imagenet where it was
     fetched before, else edges), or the path of a VGG's weights."""
@@ -113,7 +116,7 @@ class TrainingConfig(ABC):
                 f"`shortest_rollout` {self.shortest_rollout}: must be from 1 to "
                 f"`longest_rollout` ({self.longest_rollout})"
             )
-        for name in ("overflow", "steadiness"):
+        for name in ("overflow", "steadiness", "consistency"):
             if not 0 <= getattr(self, name) < inf:
                 raise OptionError(f"`{name}` {getattr(self, name)}: must not be negative")
         if not 0 <= self.seed < 2**63:

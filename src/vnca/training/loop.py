@@ -28,7 +28,14 @@ from vnca.training.ground import Ground
 from vnca.training.rollout import Pool, roll_out, states_to_keep
 from vnca.training.scenes import Scene
 from vnca.training.styles import WHOLE, Mix
-from vnca.training.terms import AppearanceTerm, Iteration, OverflowTerm, SteadinessTerm, Term
+from vnca.training.terms import (
+    AppearanceTerm,
+    ConsistencyTerm,
+    Iteration,
+    OverflowTerm,
+    SteadinessTerm,
+    Term,
+)
 
 
 @dataclass(frozen=True)
@@ -138,6 +145,8 @@ class Trainer:
         ]
         if config.steadiness:
             own.append(SteadinessTerm(config.steadiness))
+        if config.consistency:
+            own.append(ConsistencyTerm(config.consistency))
         self.terms = (*own, *terms)
         styles = len(self.appearances)
         self._grounds = [

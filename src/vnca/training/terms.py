@@ -142,6 +142,8 @@ class OverflowTerm(Term):
 GROWN = 2
 """Rollouts after which a state has grown its pattern, which is then to be kept."""
 _LEAST_VARIANCE = 1e-4
+_LEAST_CONTRAST = 1e-2  # of colours: what is seen to be paler than that is not kept so
+_MOSTLY_SMOKE = 0.6  # opacity of a pixel
 
 
 class Balance:
@@ -173,10 +175,8 @@ class Balance:
         self.losses = deque(losses, maxlen=self.losses.maxlen)
 
 
-class SteadinessTerm(Term):
-    """How much of a grown state a rollout changes: squared differences over the variance."""
-
-    name = "steadiness"
+class Keeping(Term):
+    """What a rollout changes of a grown state: squared differences over the variance."""
 
     def __init__(self, weight: float) -> None:
         """Weight it relative to the appearance loss."""
@@ -188,12 +188,11 @@ class SteadinessTerm(Term):
         balance = self._balance.after(float(seen.sums["appearance"].detach()))
         if seen.age < GROWN:
             return {}
-        kept, after = seen.kept[:-1], seen.after[:-1]
-        variance = (kept - kept.mean(0)).square().mean().clamp_min(_LEAST_VARIANCE)
-        # Cells that nothing was carried to are left to grow.
-        grown = kept.any(1, keepdim=True)
-        change = ((after - kept) * grown).square().mean() / variance
-        return {"steadiness": self._weight * balance * change}
+        return {self.name: self._weight * balance * self.change(seen)}
+
+    @abstractmethod
+    def change(self, seen: Iteration) -> Tensor:
+        """How much it changes: 0 nothing, 2 all of it. Differentiable in what is after it."""
 
     def snapshot(self) -> Snapshot:
         """What its weight is balanced by."""
@@ -202,6 +201,40 @@ class SteadinessTerm(Term):
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot of such a term."""
         self._balance.restore(snapshot)
+
+
+class SteadinessTerm(Keeping):
+    """How much of the state itself changes."""
+
+    name = "steadiness"
+
+    def change(self, seen: Iteration) -> Tensor:
+        """Of all cells, but for those that nothing was carried to: they are left to grow."""
+        kept, after = seen.kept[:-1], seen.after[:-1]
+        variance = (kept - kept.mean(0)).square().mean().clamp_min(_LEAST_VARIANCE)
+        grown = kept.any(1, keepdim=True)
+        return ((after - kept) * grown).square().mean() / variance
+
+
+class ConsistencyTerm(Keeping):
+    """How much of what is seen changes: small changes of a state may move large strokes.
+
+    Reference: Ruder et al. 2016 (temporal consistency loss), of a state as the smoke carries it.
+    """
+
+    name = "consistency"
+
+    def change(self, seen: Iteration) -> Tensor:
+        """Of the pixels that show mostly smoke."""
+        # Cells that nothing was carried to are left to grow.
+        kept = torch.where(seen.kept.any(1, keepdim=True), seen.kept, seen.after.detach())
+        with torch.no_grad():
+            before, _ = seen.scene.pictures(kept, seen.viewpoint, seen.background)
+            shown = (seen.opacity > _MOSTLY_SMOKE)[:, None].to(before)
+            pixels = shown.sum().clamp_min(1)
+            mean = (before * shown).sum((0, 2, 3), keepdim=True) / pixels
+            variance = ((before - mean).square() * shown).sum().clamp_min(_LEAST_CONTRAST * pixels)
+        return ((seen.pictures - before).square() * shown).sum() / variance
 
 
 class MassTerm(Term):
