@@ -57,8 +57,8 @@ def test_help_groups_options_and_tells_defaults_of_the_preset(vnca: Vnca) -> Non
     draft, standard = (
         vnca("train", "-p", name, "--help-all").out for name in ("draft", "standard")
     )
-    assert re.search(r"--iterations INT .*\(default: 80\)", draft)
-    assert not re.search(r"--iterations INT .*\(default: 80\)", standard)
+    assert re.search(r"--iterations INT .*\(default: 160\)", draft)
+    assert not re.search(r"--iterations INT .*\(default: 160\)", standard)
     assert "\nHow the smoke is looked at while training:\n  --view.size INT" in draft
     assert "--texture FLOAT" in draft
     assert "--density-prior, --no-density-prior" in draft
