@@ -18,6 +18,7 @@ from workshop import HERE, made
 
 from vnca.core.colour import srgb_to_linear
 from vnca.io.picture import fit, write_image
+from vnca.recipe.film import FilmConfig
 from vnca.rule.library import SUFFIX, load_style, style_names
 
 FILMS = HERE / "smoke"
@@ -39,8 +40,8 @@ class Scene(NamedTuple):
 
 SCENES = {
     "plume": Scene(cells=64, frames=40, refine=2, light=0.0),
-    "ring": Scene(cells=64, frames=40, refine=2, light=2.0),
-    "jets": Scene(cells=128, frames=40, refine=1, light=2.0),
+    "ring": Scene(cells=64, frames=40, refine=2, light=FilmConfig.light),
+    "jets": Scene(cells=128, frames=40, refine=1, light=FilmConfig.light),
 }
 
 

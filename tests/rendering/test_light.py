@@ -92,7 +92,7 @@ def test_thin_smoke_has_its_own_colours() -> None:
     torch.testing.assert_close(lit, glowing, rtol=1e-3, atol=0)
 
 
-def test_smoke_that_faces_the_light_nearly_has_its_own_colours() -> None:
+def test_smoke_that_faces_the_light_has_most_of_its_brightness() -> None:
     middle = SIZE // 2
     assert seen(ball(), Light(0.0, 0.0)).colour[middle, middle, 0] > 0.7
 
@@ -108,7 +108,7 @@ def test_a_slab_throws_a_shadow_on_what_is_behind_it() -> None:
     assert dark < 0.2 * bright
 
 
-@pytest.mark.parametrize("spacing", [1.0, 3.0])
+@pytest.mark.parametrize("spacing", [0.0, 3.0])
 @pytest.mark.parametrize(
     "angles", [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (270.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
 )

@@ -124,7 +124,7 @@ def test_cycles_and_our_film_agree_on_lit_smoke(
     assert np.corrcoef(*brightness)[0, 1] > least
     assert abs(theirs - our).mean() / our.mean() < most
     # Measured of marble and café: 0.012 and 0.033.
-    assert abs(hue[0] - hue[1]).mean() < 0.04
+    assert abs(hue[0] - hue[1]).mean() < 0.035
     # It is lit from the left, and from above.
     side = np.argwhere(solid)[:, 1] < np.median(np.argwhere(solid)[:, 1])
     assert all(bright[side].mean() > bright[~side].mean() for bright in brightness)

@@ -76,7 +76,7 @@ class Light:
     @property
     def full(self) -> float:
         """What a colour is multiplied by where no smoke is in the way."""
-        return max(1 - self.strength, 0.0) + self.strength
+        return max(1.0, self.strength)
 
 
 class LightVolume:
@@ -123,7 +123,7 @@ class LightVolume:
         extinction = _averaged(density, times.tolist(), before.tolist()) * np.float32(gamma)
         in_cells = np.linalg.inv(matrix * times)
         shadow = np.zeros(extinction.shape, np.float32)
-        for part, others, ways in (
+        for part, facing, ways in (
             (1 - light.ambient, FACING, ((1.0, light.towards),)),
             (light.ambient, EVEN, SKY),
         ):
@@ -133,7 +133,7 @@ class LightVolume:
                     for weight, way in ways
                 )
                 shadow += np.float32(part * light.strength) * np.maximum(
-                    1 - reached / np.float32(others), 0
+                    1 - reached / np.float32(facing), 0
                 )
         self.shade = Shade(
             shadow,

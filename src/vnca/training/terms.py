@@ -28,7 +28,7 @@ from vnca.losses import (
     overflow,
     supervised,
 )
-from vnca.losses.appearance import AppearanceLoss
+from vnca.losses.appearance import AppearanceConfig, AppearanceLoss
 from vnca.rule import DENSITY_CHANGE
 from vnca.training import Snapshot
 from vnca.training.scenes import Scene
@@ -143,7 +143,6 @@ GROWN = 2
 """Rollouts after which a state has grown its pattern, which is then to be kept."""
 _LEAST_VARIANCE = 1e-4
 _LEAST_CONTRAST = 1e-2  # of colours: what is seen to be paler than that is not kept so
-_MOSTLY_SMOKE = 0.6  # opacity of a pixel
 
 
 class Balance:
@@ -230,7 +229,7 @@ class ConsistencyTerm(Keeping):
         kept = torch.where(seen.kept.any(1, keepdim=True), seen.kept, seen.after.detach())
         with torch.no_grad():
             before, _ = seen.scene.pictures(kept, seen.viewpoint, seen.background)
-            shown = (seen.opacity > _MOSTLY_SMOKE)[:, None].to(before)
+            shown = (seen.opacity > AppearanceConfig.opacity_threshold)[:, None].to(before)
             pixels = shown.sum().clamp_min(1)
             mean = (before * shown).sum((0, 2, 3), keepdim=True) / pixels
             variance = ((before - mean).square() * shown).sum().clamp_min(_LEAST_CONTRAST * pixels)

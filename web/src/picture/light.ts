@@ -21,10 +21,10 @@ const EVEN = OCTAVES.reduce(
   0,
 );
 /** Weights and directions of a sky: the sides and the corners of a cube. */
-const SKY = directions().filter(([, , , corners]) => corners !== 2).map(([x, y, z, corners]) => ({
-  weight: corners === 1 ? 1 / 15 : 3 / 40,
-  way: scaled([x, y, z], 1 / Math.sqrt(corners)),
-}));
+const SKY = directions().map((way) => {
+  const axes = way.filter((step) => step !== 0).length;
+  return { weight: axes === 1 ? 1 / 15 : 3 / 40, way: scaled(way, 1 / Math.sqrt(axes)) };
+});
 const SLOT = 256;
 const WAY = 24;
 
@@ -38,7 +38,7 @@ export interface Light {
 
 /** What a colour is multiplied by where no smoke is in the way. */
 export function full({ strength }: Light): number {
-  return Math.max(1 - strength, 0) + strength;
+  return Math.max(1, strength);
 }
 
 export class LightVolume {
@@ -99,17 +99,16 @@ export class LightVolume {
       gpu.compute(lightCode, entry),
     );
     const [blocks, across] = [fours(size), Math.ceil(layers / 8)];
-    const found = { 2: this.thickness, 3: this.depth, 5: this.ways };
+    const { thickness, depth, ways } = this;
     gpu.submit((encoder) => {
-      const views = { 1: drawn.createView(), 2: this.thickness };
-      run(encoder, gather, [gpu.bound(gather, 0, { 0: slot(0), ...views })], blocks);
+      const gathered = { 0: slot(0), 1: drawn.createView(), 2: thickness };
+      run(encoder, gather, [gpu.bound(gather, 0, gathered)], blocks);
       for (let layer = 0; layer < layers; layer++) {
-        const group = gpu.bound(sweep, 0, { 0: slot(layer), ...found });
-        run(encoder, sweep, [group], [across, across, 1 + SKY.length]);
+        const swept = { 0: slot(layer), 2: thickness, 3: depth, 5: ways };
+        run(encoder, sweep, [gpu.bound(sweep, 0, swept)], [across, across, 1 + SKY.length]);
       }
-      const { 2: _, ...reached } = found;
-      const shown = { 0: slot(0), ...reached, 4: this.shadow.createView() };
-      run(encoder, shade, [gpu.bound(shade, 0, shown)], blocks);
+      const shaded = { 0: slot(0), 3: depth, 4: this.shadow.createView(), 5: ways };
+      run(encoder, shade, [gpu.bound(shade, 0, shaded)], blocks);
     });
   }
 
@@ -149,10 +148,10 @@ export class LightVolume {
   }
 }
 
-/** The 26 ways from the middle of a cube to its sides, edges and corners; how many axes they follow. */
-function directions(): number[][] {
+/** The ways from the middle of a cube to its sides and corners: along an odd number of axes. */
+function directions(): Vector[] {
   const steps = [-1, 0, 1];
   return steps
-    .flatMap((x) => steps.flatMap((y) => steps.map((z) => [x, y, z, Math.abs(x) + Math.abs(y) + Math.abs(z)])))
-    .filter(([, , , axes]) => axes > 0);
+    .flatMap((x) => steps.flatMap((y) => steps.map((z) => [x, y, z])))
+    .filter(([x, y, z]) => (x + y + z) % 2 !== 0);
 }
